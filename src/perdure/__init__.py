@@ -1,0 +1,1 @@
+"""Perdure: follow every moving thing in a video."""

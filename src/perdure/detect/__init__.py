@@ -1,0 +1,1 @@
+"""Detectors: pixels in, regions out; each is a fold with a state of its own."""

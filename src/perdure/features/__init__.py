@@ -1,0 +1,1 @@
+"""Numbers of one region or of a pair of regions."""

@@ -1,0 +1,1 @@
+"""Mathematics that knows arrays, not videos; each function is tested against an oracle."""

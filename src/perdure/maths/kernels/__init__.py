@@ -1,0 +1,1 @@
+"""Numba kernels, each with a NumPy or SciPy twin of the same signature."""

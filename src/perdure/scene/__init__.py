@@ -1,0 +1,1 @@
+"""What is known of the place: zones, ground plane, scenarios."""

@@ -1,0 +1,1 @@
+"""Trackers: regions in, reports out; none imports another."""
