@@ -1,0 +1,179 @@
+"""The plain background model: one running Gaussian per pixel, and the camera's exposure.
+
+Wren, Azarbayejani, Darrell, Pentland, *Pfinder* (1997): each pixel keeps a mean colour and a variance;
+what lies further from the mean than some multiples of the noise is foreground. Departures:
+the model may take a first look over a whole file (`prepare`: median and median deviation, so that a clip
+that begins with people in it leaves no ghosts); each frame is first brought to the model's exposure by one
+factor per channel (automatic gain, lights); foreground sinks in more slowly than background adapts.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.detect.components import clean, components
+from perdure.errors import ParameterError
+from perdure.params import parameter
+from perdure.types import Frame, Image, Regions, Scene
+
+Single = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """What a look over the whole file gave: the median picture and its noise."""
+
+    mean: Single  # (H, W, 3) grey levels
+    variance: Single  # (H, W) squared grey levels, mean over channels
+
+
+@dataclass(frozen=True, eq=False)
+class BackgroundState:
+    """The model of every pixel and its age."""
+
+    mean: Single  # (H, W, 3); (0, 0, 3) before the first frame
+    variance: Single  # (H, W)
+    age: float  # seconds learnt so far
+    time: float  # of the last frame
+    roi: NDArray[np.bool_] | None
+    height: int
+    fps: float
+
+
+@dataclass(frozen=True)
+class Background:
+    """Regions of whatever differs from the learnt background.
+
+    >>> detector = Background(threshold=4.0)
+    >>> state = detector.start(Scene(64, 48))
+    >>> state, regions = detector.step(state, Frame(0, 0.0, np.zeros((48, 64, 3), np.uint8)))
+    >>> len(regions)
+    0
+    """
+
+    threshold: float = parameter(
+        3.0, "how far from the background a pixel is foreground", unit="noise deviations", low=0.5, high=50.0
+    )
+    least_noise: float = parameter(
+        5.0, "noise assumed where less is measured", unit="grey levels", low=0.5, high=100.0
+    )
+    memory: float = parameter(
+        30.0, "time over which the background adapts to slow changes", unit="s", low=0.1, high=86400.0
+    )
+    absorb: float = parameter(
+        120.0,
+        "time over which a thing that stands still sinks into the background",
+        unit="s",
+        low=0.1,
+        high=86400.0,
+    )
+    least_area: float = parameter(0.0003, "smallest region", unit="of the frame's area", low=0.0, high=1.0)
+    closing: float = parameter(
+        0.005, "gaps closed within a region", unit="of the frame's height", low=0.0, high=0.1
+    )
+    first_look: FirstLook | None = field(default=None, repr=False, compare=False)
+
+    needs_pixels = True
+
+    def prepare(self, frames: Sequence[Frame]) -> Background:
+        """Return this detector with a first look over a file, from frames spread over all of it."""
+        images = [_smooth(frame.image) for frame in frames if frame.image is not None]
+        if len(images) < _LEAST_LOOKS:
+            return self
+        return dataclasses.replace(self, first_look=look_over(np.stack(images)))
+
+    def start(self, scene: Scene) -> BackgroundState:
+        """Return the state before the first frame: nothing learnt, or the first look."""
+        mean, variance, age = np.zeros((0, 0, 3), np.float32), np.zeros((0, 0), np.float32), 0.0
+        if self.first_look is not None:
+            mean, variance, age = self.first_look.mean.copy(), self.first_look.variance.copy(), self.memory
+        return BackgroundState(mean, variance, age, -1.0 / scene.fps, scene.roi, scene.height, scene.fps)
+
+    def step(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, Regions]:
+        """Return the regions of one frame; the model learns from it.
+
+        Raises
+        ------
+        ParameterError
+            If the frame has no picture.
+        """
+        if frame.image is None:
+            raise ParameterError("the background detector needs pictures; give --detector a file of detections")
+        image = _smooth(frame.image)
+        if not state.mean.size:
+            first = np.full(image.shape[:2], self.least_noise**2, np.float32)
+            state = dataclasses.replace(state, mean=image.astype(np.float32), variance=first)
+        elapsed = max(frame.time - state.time, 0.1 / state.fps)
+        foreground = self._compare_and_learn(state, image, elapsed)
+        found = components(
+            clean(foreground, round(self.closing * state.height)), self.least_area * foreground.size, state.roi
+        )
+        return dataclasses.replace(state, age=state.age + elapsed, time=frame.time), found
+
+    def _compare_and_learn(self, state: BackgroundState, image: Image, elapsed: float) -> NDArray[np.uint8]:
+        from perdure.maths.kernels.gaussian import compare_and_learn
+
+        young = elapsed / (state.age + elapsed)  # a plain mean as long as little is known
+        rate = max(1.0 - math.exp(-elapsed / self.memory), young)
+        foreground_rate = max(1.0 - math.exp(-elapsed / self.absorb), young if state.age < _HEALING else 0.0)
+        foreground = np.empty(image.shape[:2], np.uint8)
+        compare_and_learn(
+            image,
+            exposure(image, state.mean),
+            state.mean,
+            state.variance,
+            foreground,
+            np.float32(self.threshold**2),
+            np.float32(self.least_noise**2),
+            np.float32(rate),
+            np.float32(foreground_rate),
+        )
+        return foreground
+
+
+def look_over(images: NDArray[np.uint8]) -> FirstLook:
+    """Return median and noise of pictures spread over a film, (N, H, W, 3) uint8.
+
+    The noise is the median deviation from the median, scaled to a Gaussian's standard deviation.
+    """
+    images = images[: len(images) - (1 - len(images) % 2)]  # an odd number: the median is one of them
+    half = len(images) // 2
+    mean = np.empty(images.shape[1:], np.float32)
+    variance = np.empty(images.shape[1:3], np.float32)
+    for y in range(0, images.shape[1], _STRIP):  # in strips that stay in the cache
+        strip = images[:, y : y + _STRIP]  # (N, strip, W, 3)
+        middle = np.partition(strip, half, axis=0)[half]
+        deviation = np.partition(np.maximum(strip, middle) - np.minimum(strip, middle), half, axis=0)[half]
+        mean[y : y + _STRIP] = middle
+        variance[y : y + _STRIP] = np.square(deviation * _GAUSSIAN).mean(axis=2)
+    return FirstLook(mean, variance)
+
+
+def exposure(image: Image, mean: Single) -> Single:
+    """Return the factor per channel (3,) that brings a picture to the model's exposure.
+
+    The median of mean / image over a coarse grid: right as long as less than half of it is foreground.
+    Within one percent it is 1, so that a still scene stays untouched.
+    """
+    step = max(1, min(image.shape[:2]) // _GRID)
+    seen = image[::step, ::step].astype(np.float32)
+    factors = np.median(np.maximum(mean[::step, ::step], 1.0) / np.maximum(seen, 1.0), axis=(0, 1))
+    return np.where(np.abs(factors - 1.0) < 0.01, 1.0, factors).astype(np.float32)
+
+
+_LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
+_HEALING = 2.0  # s: without a first look, what stands at the start is averaged in for this long
+_STRIP = 32  # rows
+_GRID = 72  # rows of the grid on which the exposure is measured
+_GAUSSIAN = 1.4826  # standard deviation of a Gaussian / its median absolute deviation
+
+
+def _smooth(image: Image) -> Image:
+    return np.asarray(cv2.GaussianBlur(image, (3, 3), 0), np.uint8)

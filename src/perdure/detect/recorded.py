@@ -1,0 +1,49 @@
+"""Regions that were recorded before: another program's detections, or a file of `perdure detect`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from perdure.features.boxes import centres
+from perdure.params import parameter
+from perdure.types import Frame, Regions, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedState:
+    """The region of interest; all else is in the record."""
+
+    roi: np.ndarray[tuple[int, int], np.dtype[np.bool_]] | None
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Regions looked up by frame number; a frame that is not in the record has none.
+
+    >>> detector = Recorded(regions_of=lambda index: Regions.of([[0, 0, 9, 9]], scores=[0.2]), least_score=0.5)
+    >>> _, regions = detector.step(detector.start(Scene(64, 48)), Frame(0, 0.0))
+    >>> len(regions)
+    0
+    """
+
+    least_score: float = parameter(0.0, "recorded regions with a lower score are left out", low=0.0, high=1.0)
+    regions_of: Callable[[int], Regions] = field(default=lambda index: Regions.empty(), repr=False, compare=False)
+
+    needs_pixels = False
+
+    def start(self, scene: Scene) -> RecordedState:
+        """Return the state before the first frame."""
+        return RecordedState(scene.roi)
+
+    def step(self, state: RecordedState, frame: Frame) -> tuple[RecordedState, Regions]:
+        """Return the recorded regions of one frame whose centre lies in the roi."""
+        regions = self.regions_of(frame.index)
+        kept = regions.scores >= self.least_score
+        if state.roi is not None and len(regions):
+            height, width = state.roi.shape
+            x, y = np.clip(centres(regions.boxes), 0, (width - 1, height - 1)).astype(np.intp).T
+            kept = kept & state.roi[y, x]
+        return state, regions if kept.all() else regions.take(kept)

@@ -1,0 +1,50 @@
+"""Numbers of boxes and of pairs of boxes; boxes are (N, 4) x1 y1 x2 y2, half-open, in pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.types import Boxes
+
+Float = NDArray[np.float32]
+
+
+def sizes(boxes: Boxes) -> Float:
+    """Return widths and heights (N, 2), never negative."""
+    return np.asarray(np.maximum(boxes[:, 2:] - boxes[:, :2], 0.0), np.float32)
+
+
+def centres(boxes: Boxes) -> Float:
+    """Return centres (N, 2)."""
+    return np.asarray((boxes[:, :2] + boxes[:, 2:]) / 2.0, np.float32)
+
+
+def areas(boxes: Boxes) -> Float:
+    """Return areas (N,) in square pixels."""
+    return np.asarray(sizes(boxes).prod(axis=1), np.float32)
+
+
+def intersections(one: Boxes, other: Boxes) -> Float:
+    """Return the areas (N, M) that the boxes of `one` share with those of `other`."""
+    low = np.maximum(one[:, None, :2], other[None, :, :2])  # (N, M, 2)
+    high = np.minimum(one[:, None, 2:], other[None, :, 2:])  # (N, M, 2)
+    return np.asarray(np.maximum(high - low, 0.0).prod(axis=2), np.float32)  # (N, M)
+
+
+def overlaps(one: Boxes, other: Boxes) -> Float:
+    """Return intersection over union (N, M) in [0, 1]; 0 for two boxes without area.
+
+    >>> overlaps(np.array([[0, 0, 2, 2]], np.float32), np.array([[1, 0, 3, 2]], np.float32)).tolist()
+    [[0.3333333432674408]]
+    """
+    shared = intersections(one, other)
+    union = areas(one)[:, None] + areas(other)[None, :] - shared
+    return np.asarray(np.divide(shared, union, out=np.zeros_like(shared), where=union > 0), np.float32)
+
+
+def enclosing(boxes: Boxes) -> Boxes:
+    """Return the one box (4,) around all boxes; zeros for none."""
+    if not len(boxes):
+        return np.zeros(4, np.float32)
+    return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])

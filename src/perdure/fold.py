@@ -1,0 +1,193 @@
+"""The fold: a state, a frame, its regions, a report; and `settle`, which applies late corrections.
+
+`Tracker` and `Detector` are the only contract. `detect` and `track` run one over a film; `settle` turns
+the reports, whose identities may have been decided late, into one row per (frame, id).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from perdure.types import Dropped, Event, Frame, Regions, Renamed, Report, Scene, Tracks
+
+S = TypeVar("S")
+
+
+class Detector(Protocol[S]):
+    """Pixels to regions: a frozen dataclass of parameters with a state of its own.
+
+    A detector may also have `prepare(frames) -> Detector`, a first look over frames spread over a file.
+    `needs_pixels` says whether it can work on frames without a picture.
+    """
+
+    needs_pixels: bool
+
+    def start(self, scene: Scene) -> S:
+        """Return the state before the first frame."""
+        ...
+
+    def step(self, state: S, frame: Frame) -> tuple[S, Regions]:
+        """Consume a state, return the next one and what is seen in the frame."""
+        ...
+
+
+class Tracker(Protocol[S]):
+    """Regions to reports: a frozen dataclass of parameters; it prints, compares, is its own configuration.
+
+    `step` changes neither `frame` nor `regions` and depends on nothing else. The state passed in is
+    consumed: its buffers may be reused; `perdure.states.save` gives an independent copy.
+    """
+
+    needs_pixels: bool
+
+    def start(self, scene: Scene) -> S:
+        """Return the state before the first frame."""
+        ...
+
+    def step(self, state: S, frame: Frame, regions: Regions) -> tuple[S, Report]:
+        """Consume a state, return the next one and what was learnt."""
+        ...
+
+    def finish(self, state: S) -> Report:
+        """Return what is left to say when no frame will come any more."""
+        ...
+
+
+class Step(NamedTuple):
+    """One step of a run; `frame` is None for the last, in which the tracker finishes."""
+
+    frame: Frame | None
+    regions: Regions
+    report: Report
+
+
+def detect(frames: Iterable[Frame], detector: Detector[Any], scene: Scene) -> Iterator[tuple[Frame, Regions]]:
+    """Yield every frame with the regions that are seen in it."""
+    state = detector.start(scene)
+    for frame in frames:
+        state, regions = detector.step(state, frame)
+        yield frame, regions
+
+
+def track(seen: Iterable[tuple[Frame, Regions]], tracker: Tracker[Any], scene: Scene) -> Iterator[Step]:
+    """Yield a step for every frame, and one more in which the tracker finishes."""
+    state = tracker.start(scene)
+    for frame, regions in seen:
+        state, report = tracker.step(state, frame, regions)
+        yield Step(frame, regions, report)
+    yield Step(None, Regions.empty(), tracker.finish(state))
+
+
+def settle(reports: Iterable[Report]) -> Tracks:
+    """Return one row per (frame, id), sorted, with every correction applied.
+
+    >>> row = Tracks.of(frames=0, times=0.0, ids=[2], boxes=[[0, 0, 9, 9]])
+    >>> settle([Report(row), Report(renamed=(Renamed(old=2, new=1, begin=0, end=0),))]).ids.tolist()
+    [1]
+    """
+    reports = list(reports)
+    return Tracks.join(rows for _, rows in settle_by_frame(lambda: reports))
+
+
+def settle_by_frame(read: Callable[[], Iterable[Report]]) -> Iterator[tuple[int, Tracks]]:
+    """Yield (frame, settled rows) in order of frames, for every frame that has a row.
+
+    `read` is called twice: once for the corrections and the rows said late, once for the rows. Only those
+    are held in memory, so that a log of any length can be settled.
+    """
+    corrections = Corrections.of(read())
+    late = deque(sorted(corrections.late.items()))
+    for number, rows in _punctual(read()):
+        frame = int(rows.frames[0])
+        while late and late[0][0] < frame:
+            yield from corrections.settled(*late.popleft())
+        also = late.popleft()[1] if late and late[0][0] == frame else []
+        yield from corrections.settled(frame, [(number, rows), *also])
+    for frame, said in late:
+        yield from corrections.settled(frame, said)
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """All corrections of a run, each with the number of its report, and the rows that were said late.
+
+    A correction holds for rows of earlier reports; those of its own report were said in its knowledge.
+    """
+
+    by_id: dict[int, list[tuple[int, Renamed | Dropped]]]
+    late: dict[int, list[tuple[int, Tracks]]]  # frame -> (number of the report, rows)
+
+    @staticmethod
+    def of(reports: Iterable[Report]) -> Corrections:
+        """Read all corrections and late rows."""
+        by_id: dict[int, list[tuple[int, Renamed | Dropped]]] = {}
+        late: dict[int, list[tuple[int, Tracks]]] = {}
+        newest = -1
+        for number, report in enumerate(reports):
+            for renamed in report.renamed:
+                by_id.setdefault(renamed.old, []).append((number, renamed))
+            for dropped in report.dropped:
+                by_id.setdefault(dropped.id, []).append((number, dropped))
+            newest, _, behind = _split_late(report.rows, newest)
+            for frame in np.unique(behind.frames):
+                late.setdefault(int(frame), []).append((number, behind.in_frame(frame)))
+        return Corrections(by_id, late)
+
+    def identity(self, said: int, frame: int, number: int) -> int:
+        """Return the settled id of what report `number` called `said`; 0 if it was dropped."""
+        while True:
+            for later, one in self.by_id.get(said, ()):
+                if later > number and one.begin <= frame <= one.end:
+                    break
+            else:
+                return said
+            if isinstance(one, Dropped):
+                return 0
+            said, number = one.new, later
+
+    def event(self, event: Event, number: int) -> Event:
+        """Return an event of report `number` with its settled ids."""
+        ids = (self.identity(one, event.begin, number) for one in event.ids)
+        return (
+            event if not self.by_id else event.__class__(**{**event.__dict__, "ids": tuple(i for i in ids if i)})
+        )
+
+    def settled(self, frame: int, said: list[tuple[int, Tracks]]) -> Iterator[tuple[int, Tracks]]:
+        """Yield (frame, rows), one per id: of two, the one seen before the one inferred, then the surer, then the later."""
+        parts = []
+        for number, part in said:
+            if self.by_id:
+                ids = [self.identity(int(one), frame, number) for one in part.ids]
+                groups = [self.identity(int(one), frame, number) if one else 0 for one in part.groups]
+                part = part.replace(ids=np.array(ids, np.int64), groups=np.array(groups, np.int64))
+            parts.append(part.take(part.ids > 0))
+        rows = Tracks.join(parts)
+        order = np.lexsort((-np.arange(len(rows)), -rows.confidence, rows.inferred, rows.ids))
+        best = np.append(True, np.diff(rows.ids[order]) != 0)[: len(order)]
+        if len(rows):
+            yield frame, rows.take(order[best])
+
+
+def _punctual(reports: Iterable[Report]) -> Iterator[tuple[int, Tracks]]:
+    """Yield (number of the report, its rows of a frame of which nothing was said before)."""
+    newest = -1
+    for number, report in enumerate(reports):
+        newest, rows, _ = _split_late(report.rows, newest)
+        if len(rows):
+            yield number, rows
+
+
+def _split_late(rows: Tracks, newest: int) -> tuple[int, Tracks, Tracks]:
+    """Split rows into those of the newest frame and those said late; return that frame, both."""
+    if not len(rows):
+        return newest, rows, rows
+    last = int(rows.frames.max())
+    on_time = (rows.frames == last) & (last > newest)
+    if on_time.all():
+        return last, rows, Tracks.empty()
+    return max(last, newest), rows.take(on_time), rows.take(~on_time)

@@ -1,0 +1,150 @@
+"""The smallest tracker, the example to copy: what overlaps what was expected is the same thing.
+
+Each target is expected where its last speed would bring it; regions are given to targets so that as many
+as possible overlap, and overlap most (Bewley et al. 2016, *SORT*, without its Kalman filter). A target not
+seen is kept for `patience` seconds; one seen for `confirm` seconds gets an id, and its first rows are said late.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.features.boxes import centres, overlaps
+from perdure.features.masks import disjoint
+from perdure.maths.assign import assign
+from perdure.params import parameter
+from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
+
+
+@dataclass(frozen=True, eq=False)
+class OverlapState:
+    """All targets, a row each."""
+
+    ids: NDArray[np.int64]  # (N,), 0 until confirmed
+    boxes: Boxes  # (N, 4) where last seen
+    speed: NDArray[np.float32]  # (N, 2) px/s
+    born: NDArray[np.float64]  # (N,) s, first seen
+    seen: NDArray[np.float64]  # (N,) s, last seen
+    unsaid: tuple[Tracks, ...]  # N; rows earned before the id
+    next_id: int
+    scene_size: tuple[int, int]  # height, width
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Track by overlap alone: right where targets move less than their own size and rarely meet."""
+
+    least_overlap: float = parameter(
+        0.15, "overlap (IoU) below which a region is not the target", low=0.001, high=1.0
+    )
+    patience: float = parameter(1.0, "how long an unseen target is kept", unit="s", low=0.0, high=3600.0)
+    confirm: float = parameter(
+        0.25, "how long a target must have been seen before it is said", unit="s", low=0.0, high=60.0
+    )
+    inertia: float = parameter(0.3, "time over which speed is averaged", unit="s", low=0.0, high=60.0)
+
+    needs_pixels = False
+
+    def start(self, scene: Scene) -> OverlapState:
+        """Return the state without a target."""
+        none, places = np.zeros(0), np.zeros((0, 4), np.float32)
+        size = (scene.height, scene.width)
+        return OverlapState(none.astype(np.int64), places, places[:, :2], none, none, (), 1, size)
+
+    def step(self, state: OverlapState, frame: Frame, regions: Regions) -> tuple[OverlapState, Report]:
+        """Predict, match, update, give birth, say, retire."""
+        overlap = overlaps(_expected(state, frame.time), regions.boxes)  # (N, M)
+        pairs, _, unmatched = assign(np.where(overlap >= self.least_overlap, 1.0 - overlap, np.inf))
+        state = self._update(state, frame.time, regions.boxes, pairs)
+        state = _give_birth(state, frame.time, regions.boxes[unmatched])
+        link = np.full(len(state.ids), -1)  # the region of each target
+        link[pairs[:, 0]] = pairs[:, 1]
+        link[len(link) - len(unmatched) :] = unmatched
+        state, rows, events = self._say(state, frame, regions, link)
+        state, left = self._retire(state, frame, link)
+        return state, Report(rows, events=(*events, *left))
+
+    def finish(self, state: OverlapState) -> Report:
+        """Return what is left to say: nothing."""
+        return Report.empty()
+
+    def _update(
+        self, state: OverlapState, time: float, seen_boxes: Boxes, pairs: NDArray[np.intp]
+    ) -> OverlapState:
+        """Move matched targets to their regions; average the speed over the last `inertia` seconds."""
+        rows, columns = pairs.T
+        boxes, speed, seen = state.boxes.copy(), state.speed.copy(), state.seen.copy()
+        elapsed = np.maximum(time - seen[rows], 1e-6)[:, None]  # (K, 1)
+        known = np.minimum(self.inertia, seen[rows] - state.born[rows])[:, None]  # (K, 1)
+        moved = (centres(seen_boxes[columns]) - centres(boxes[rows])) / elapsed  # (K, 2)
+        speed[rows] += (moved - speed[rows]) * elapsed / (elapsed + known)
+        boxes[rows], seen[rows] = seen_boxes[columns], time
+        return replace(state, boxes=boxes, speed=speed, seen=seen)
+
+    def _say(
+        self, state: OverlapState, frame: Frame, regions: Regions, link: NDArray[np.intp]
+    ) -> tuple[OverlapState, Tracks, list[Event]]:
+        """Name the targets that have been seen long enough; say the rows of all that have a name."""
+        named = np.flatnonzero((state.ids == 0) & (link >= 0) & (frame.time - state.born >= self.confirm - 1e-9))
+        ids = state.ids.copy()
+        ids[named] = state.next_id + np.arange(len(named))
+        rows = self._rows(replace(state, ids=ids), frame, regions, link)
+        late = [state.unsaid[i].replace(ids=np.full(len(state.unsaid[i]), ids[i])) for i in named]
+        first = [int(part.frames[0]) if len(part) else frame.index for part in late]
+        events = [Event("entered", begin, begin, (int(i),)) for begin, i in zip(first, ids[named], strict=True)]
+        unsaid = tuple(
+            Tracks.empty() if ids[i] else Tracks.join([part, rows.take([i])])
+            for i, part in enumerate(state.unsaid)
+        )
+        state = replace(state, ids=ids, unsaid=unsaid, next_id=state.next_id + len(named))
+        return state, Tracks.join([*late, rows.take(ids > 0)]), events
+
+    def _rows(self, state: OverlapState, frame: Frame, regions: Regions, link: NDArray[np.intp]) -> Tracks:
+        """Return a row for every target; an unseen one is LOST, where it is expected, less and less surely."""
+        hope = 1.0 - (frame.time - state.seen) / max(self.patience, 1e-6)
+        seen = link >= 0
+        return Tracks.of(
+            frames=frame.index,
+            times=frame.time,
+            ids=state.ids,
+            boxes=_expected(state, frame.time),
+            status=np.where(seen, Status.VISIBLE, Status.LOST),
+            confidence=np.where(seen, np.append(regions.scores, 0)[link], np.clip(hope, 0.0, 1.0)),
+            classes=np.append(regions.classes, "")[link],
+            inferred=~seen,
+            masks=disjoint([(*regions.masks, Mask.empty())[j] for j in link], *state.scene_size),
+            links=[(int(j),) if j >= 0 else () for j in link],
+        )
+
+    def _retire(
+        self, state: OverlapState, frame: Frame, link: NDArray[np.intp]
+    ) -> tuple[OverlapState, list[Event]]:
+        """Let go of targets not seen for `patience` seconds, and of unconfirmed ones at the first miss."""
+        kept = np.where(state.ids > 0, frame.time - state.seen <= self.patience, link >= 0)
+        left = [Event("left", frame.index, frame.index, (int(one),)) for one in state.ids[~kept & (state.ids > 0)]]
+        columns = {name: getattr(state, name)[kept] for name in ("ids", "boxes", "speed", "born", "seen")}
+        return replace(state, **columns, unsaid=tuple(state.unsaid[i] for i in np.flatnonzero(kept))), left
+
+
+def _expected(state: OverlapState, time: float) -> Boxes:
+    """Where the last speed brings each target (N, 4)."""
+    shift = state.speed * (time - state.seen)[:, None]  # (N, 2)
+    return np.asarray(state.boxes + np.tile(shift, 2), np.float32)
+
+
+def _give_birth(state: OverlapState, time: float, boxes: Boxes) -> OverlapState:
+    """Add an unnamed target for every region that nobody claimed."""
+    count = len(boxes)
+    now = np.full(count, time)
+    return replace(
+        state,
+        ids=np.concatenate([state.ids, np.zeros(count, np.int64)]),
+        boxes=np.concatenate([state.boxes, boxes]),
+        speed=np.concatenate([state.speed, np.zeros((count, 2), np.float32)]),
+        born=np.concatenate([state.born, now]),
+        seen=np.concatenate([state.seen, now]),
+        unsaid=state.unsaid + (Tracks.empty(),) * count,
+    )
