@@ -1,1 +1,10 @@
 """Detectors: pixels in, regions out; each is a fold with a state of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from perdure.detect.background import Background
+from perdure.detect.recorded import Recorded
+
+DETECTORS: dict[str, type[Any]] = {"background": Background, "recorded": Recorded}

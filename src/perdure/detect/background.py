@@ -122,7 +122,8 @@ class Background:
 
         young = elapsed / (state.age + elapsed)  # a plain mean as long as little is known
         rate = max(1.0 - math.exp(-elapsed / self.memory), young)
-        foreground_rate = max(1.0 - math.exp(-elapsed / self.absorb), young if state.age < _HEALING else 0.0)
+        absorb = min(self.absorb, max(state.age, _HEALING))  # a young model heals its ghosts sooner
+        foreground_rate = 1.0 - math.exp(-elapsed / absorb)
         foreground = np.empty(image.shape[:2], np.uint8)
         compare_and_learn(
             image,
@@ -169,7 +170,7 @@ def exposure(image: Image, mean: Single) -> Single:
 
 
 _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
-_HEALING = 2.0  # s: without a first look, what stands at the start is averaged in for this long
+_HEALING = 5.0  # s over which a model that has seen nothing yet takes in what stands still
 _STRIP = 32  # rows
 _GRID = 72  # rows of the grid on which the exposure is measured
 _GAUSSIAN = 1.4826  # standard deviation of a Gaussian / its median absolute deviation

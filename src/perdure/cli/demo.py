@@ -1,0 +1,71 @@
+"""`perdure demo`: draw a film, track it, and say how well that went against the film's own truth."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from perdure.cli import options
+from perdure.cli.progress import watched
+from perdure.cli.track import run
+from perdure.demo import demo_world
+from perdure.files.film import Film
+from perdure.files.mot import write_rows
+from perdure.files.runs import Reporting, RunFolder
+from perdure.files.whole import whole_file
+from perdure.metrics.clear import clear
+from perdure.pipeline import plan
+from perdure.types import Status, Tracks
+
+
+def demo(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Where film, truth and run go.")
+    ] = Path("perdure-runs/demo"),
+    tracker: Annotated[str, typer.Option(metavar="NAME", help="The tracker to show.")] = "overlap",
+    json_: options.JsonOption = False,
+) -> None:
+    """Draw a short film with meetings, a group and an occluder; track it; score it against its own truth."""
+    world = demo_world()
+    folder = RunFolder.create(output / "run", overwrite=True)
+    film = output / "film.mp4"
+    with Film(film, world.width, world.height, fps=world.fps) as written:
+        for frame in watched(world.frames(), "drawing a film of people in a square", world.count):
+            if frame.image is not None:
+                written.write(frame.image, frame.time)
+    truth = world.truth()
+    with whole_file(output / "truth.txt") as file:
+        write_rows(file, truth)
+    outcome = run(plan(film, tracker=tracker), folder, Reporting())
+    said = folder.tracks().counted()
+    figures = clear(said, to_find(truth))
+    people = len(set(truth.ids.tolist()))
+    value = {
+        "status": outcome.status,
+        "film": str(film),
+        "run": str(folder.path),
+        "frames": outcome.frames,
+        "rate": round(outcome.frames / max(outcome.seconds, 1e-9), 2),
+        "objects": people,
+        "tracks": outcome.totals.tracks,
+        "recall": round(figures.recall, 4),
+        "precision": round(figures.precision, 4),
+        "mota": round(figures.mota, 4),
+        "switches": figures.switches,
+    }
+    print(f"A film of {people} moving things was drawn and tracked from its pixels alone:")
+    print(f"  found      {figures.recall:.0%} of what was to be seen (box overlap of at least one half)")
+    print(f"  right      {figures.precision:.0%} of what was said")
+    print(f"  identities {outcome.totals.tracks} tracks for {people} things, {figures.switches} switches")
+    print(f"  MOTA       {figures.mota:.3f}   ({tracker}, {value['rate']:.0f} frames/s)")
+    print(f"Look at it: {folder.film}\nTry your own: perdure track VIDEO")
+    if json_:
+        print(json.dumps(value))
+
+
+def to_find(truth: Tracks) -> Tracks:
+    """Return the rows of the truth that a tracker should have: not those that are hidden altogether."""
+    return truth.take(truth.status != Status.OCCLUDED)

@@ -1,0 +1,62 @@
+"""The entry point: commands, and what an error looks like from outside."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from perdure import __version__
+from perdure.cli.demo import demo
+from perdure.cli.detect import detect
+from perdure.cli.draw import draw
+from perdure.cli.export import export
+from perdure.cli.track import track
+from perdure.errors import DamagedVideo, PerdureError
+
+DONE, DEFECT, MISTAKE, PART_LOST, INTERRUPTED = 0, 1, 2, 3, 130
+
+app = typer.Typer(
+    name="perdure",
+    help="Follow every moving thing in a video, on an ordinary CPU, with no training.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (track, detect, draw, export, demo):
+    app.command()(command)
+
+
+@app.callback()
+def about(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and end.", is_eager=True)] = False,
+) -> None:
+    """Follow every moving thing in a video, on an ordinary CPU, with no training."""
+    if version:
+        print(f"perdure {__version__}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command line.
+
+    Exit codes: 0 done, 1 a defect of ours, 2 the caller's mistake, 3 done but part of the input was lost,
+    130 interrupted with everything so far kept.
+    """
+    try:
+        code = app(standalone_mode=True)
+    except DamagedVideo as damage:
+        code = _say(str(damage), PART_LOST)
+    except PerdureError as error:
+        code = _say(str(error), MISTAKE)
+    except KeyboardInterrupt:
+        code = _say("interrupted", INTERRUPTED)
+    sys.exit(code)
+
+
+def _say(text: str, code: int) -> int:
+    print(f"perdure: {text}", file=sys.stderr)
+    return code

@@ -1,0 +1,149 @@
+"""Options that every command shares, and those read off the parameters' declarations."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Optional, TypeVar
+
+import typer
+
+from perdure import params
+from perdure.errors import ParameterError
+
+F = TypeVar("F", bound=Callable[..., None])
+
+SourceArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SOURCE",
+        help="A video file, a folder or glob of images, a MOTChallenge folder, a camera number, or a URL.",
+        show_default=False,
+    ),
+]
+FpsOption = Annotated[
+    Optional[float],  # noqa: UP045 - typer reads this at run time
+    typer.Option("--fps", help="Frames per second, where the source has none or a wrong one.", show_default=False),
+]
+StartOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--start",
+        metavar="T",
+        help="Begin here: seconds, mm:ss, h:mm:ss, or a frame such as 300f (from 0).",
+        show_default=False,
+    ),
+]
+EndOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--end", metavar="T", help="Stop before this time or frame.", show_default=False),
+]
+StrideOption = Annotated[int, typer.Option("--stride", metavar="N", help="Take every N-th frame.")]
+RoiOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--roi",
+        metavar="ROI",
+        help="Where things may be seen: an image (not black = inside), a box x,y,w,h, a polygon 'x,y x,y …', "
+        "or a file of polygons.",
+        show_default=False,
+    ),
+]
+ClassOption = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--class", metavar="NAME", help="Only regions of this class; may be repeated.", show_default=False
+    ),
+]
+ParametersOption = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--parameters",
+        metavar="FILE",
+        help="A JSON file of parameters by name; options on the command line win.",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print the result as one JSON object on the last line, for machines.")
+]
+DetectorOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--detector",
+        metavar="NAME|FILE",
+        help="'background' needs nothing; or a file of regions: .jsonl of `perdure detect`, MOTChallenge .txt. "
+        "Default: background, or det/det.txt of a MOTChallenge folder without images.",
+        show_default=False,
+    ),
+]
+
+
+def with_parameters(*families: tuple[str, Mapping[str, type[Any]]]) -> Callable[[F], F]:
+    """Give a command an option for each declared parameter; it gets those that were given as `chosen`.
+
+    `families` are (heading, name -> dataclass); a parameter that several classes share is one option.
+    """
+
+    def decorate(command: F) -> F:
+        declared: dict[str, tuple[params.Parameter, list[str]]] = {}
+        for heading, kinds in families:
+            for name, kind in kinds.items():
+                for one in params.describe(kind):
+                    declared.setdefault(one.name, (one, []))[1].append(f"{heading} {name}".strip())
+        own = inspect.signature(command, eval_str=True)
+
+        @functools.wraps(command)
+        def run(**arguments: Any) -> None:
+            given = {name: arguments.pop(name) for name in declared}
+            chosen = {name: value for name, value in given.items() if value is not None}
+            for name, value in chosen.items():
+                params.check_value(declared[name][0], value)
+            command(**arguments, chosen=chosen)
+
+        kept = [one for one in own.parameters.values() if one.name != "chosen"]
+        added = [_option(one, owners) for one, owners in declared.values()]
+        run.__signature__ = own.replace(parameters=[*kept, *added])  # type: ignore[attr-defined]
+        run.__annotations__ = {one.name: one.annotation for one in [*kept, *added]} | {"return": None}
+        del run.__wrapped__
+        return run  # type: ignore[return-value]
+
+    return decorate
+
+
+def read_parameters(file: Path | None, chosen: Mapping[str, object]) -> dict[str, object]:
+    """Return the parameters of a JSON file with those of the command line over them.
+
+    Raises
+    ------
+    ParameterError
+        If the file is not a JSON object of values by name.
+    """
+    if file is None:
+        return dict(chosen)
+    try:
+        values = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ParameterError(f"cannot read {file}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise ParameterError(f"{file} is not JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise ParameterError(f'{file}: wanted is a JSON object such as {{"patience": 2.0}}')
+    return {**values, **chosen}
+
+
+def _option(declared: params.Parameter, owners: list[str]) -> inspect.Parameter:
+    """The keyword of a command that stands for one parameter; None where it is not given."""
+    flag = declared.name.replace("_", "-")
+    names = [f"--{flag}/--no-{flag}"] if declared.kind is bool else [f"--{flag}"]
+    text = f"{declared.full_help} (default: {declared.default:g})" if _is_number(declared) else declared.full_help
+    option = typer.Option(*names, help=text, show_default=False, rich_help_panel=" · ".join(owners))
+    annotation: Any = Annotated[Optional[declared.kind], option]  # noqa: UP045
+    return inspect.Parameter(declared.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+def _is_number(declared: params.Parameter) -> bool:
+    return declared.kind in (int, float)

@@ -1,0 +1,189 @@
+"""`perdure track`: a video in, a run folder out."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from perdure import params
+from perdure.cli import options
+from perdure.cli.film import draw_film, drawn_while_running
+from perdure.cli.progress import watched
+from perdure.cli.stopping import Ending
+from perdure.detect import DETECTORS
+from perdure.files.log import RunLog
+from perdure.files.runs import Reporting, RunFolder, Totals
+from perdure.fold import Step
+from perdure.pipeline import Plan, plan
+from perdure.trackers import TRACKERS
+
+_FAMILIES = (("tracker", TRACKERS), ("detector", DETECTORS), ("", {"What counts": Reporting}))
+
+
+@options.with_parameters(*_FAMILIES)
+def track(
+    source: options.SourceArgument,
+    chosen: dict[str, object],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Run folder; default perdure-runs/NAME.", show_default=False
+        ),
+    ] = None,
+    tracker: Annotated[str, typer.Option(metavar="NAME", help=f"One of: {', '.join(TRACKERS)}.")] = "overlap",
+    detector: options.DetectorOption = None,
+    roi: options.RoiOption = None,
+    class_: options.ClassOption = None,
+    fps: options.FpsOption = None,
+    start: options.StartOption = None,
+    end: options.EndOption = None,
+    stride: options.StrideOption = 1,
+    parameters: options.ParametersOption = None,
+    no_video: Annotated[bool, typer.Option("--no-video", help="Do not draw tracked.mp4.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the run that DIR holds.")] = False,
+    json_: options.JsonOption = False,
+) -> None:
+    """Track every moving thing in SOURCE into a run folder."""
+    given = options.read_parameters(parameters, chosen)
+    reporting = params.build(
+        Reporting, {name: given.pop(name) for name in list(given) if name == "report_confidence"}
+    )
+    made = plan(
+        source,
+        tracker=tracker,
+        detector=detector,
+        fps=fps,
+        start=start,
+        end=end,
+        stride=stride,
+        roi=roi,
+        classes=class_ or (),
+        parameters=given,
+    )
+    folder = RunFolder.create(output or Path("perdure-runs") / made.source.name, overwrite=overwrite)
+    window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
+    outcome = run(made, folder, reporting, window=window, film=not no_video)
+    show(outcome, folder, as_json=json_)
+    if outcome.code:
+        raise typer.Exit(outcome.code)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended."""
+
+    frames: int
+    totals: Totals
+    seconds: float  # of tracking, without the film
+    status: str  # done, damaged, interrupted
+    message: str  # of the damage
+    warnings: tuple[str, ...]
+    has_film: bool
+
+    @property
+    def code(self) -> int:
+        """The exit code."""
+        return {"done": 0, "damaged": 3, "interrupted": 130}[self.status]
+
+
+def run(
+    made: Plan, folder: RunFolder, reporting: Reporting, *, window: dict[str, Any] | None = None, film: bool = True
+) -> Outcome:
+    """Run a plan into a folder: log, results, film; whatever happens, what was tracked so far is kept."""
+    about = _about(made, reporting, window or {})
+    folder.write_about({**about, "status": "running"})
+    begun = time.monotonic()
+    counted = _Count()
+    live_film = film and not made.source.rereadable
+    with Ending() as ending, RunLog(folder.log) as log:
+        frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
+        steps: Iterable[Step] = made.prepared().steps(frames)
+        if live_film:
+            steps = drawn_while_running(steps, made.scene, folder.film)
+        for step in steps:
+            log.append(-1 if step.frame is None else step.frame.index, counted.time(step.frame), step.report)
+    seconds = time.monotonic() - begun
+    status, totals = ending.status, folder.write_results(reporting)
+    about |= {
+        "frames": counted.frames,
+        "message": str(ending.damage or ""),
+        "warnings": list(made.source.warnings),
+    }
+    folder.write_about({**about, "status": status, **dataclasses.asdict(totals)})
+    has_film = live_film and folder.film.exists()
+    if film and not live_film and status != "interrupted":
+        has_film = draw_film(made.source, made.scene, folder, counted.frames)
+    made.source.close()
+    message = str(ending.damage or "")
+    return Outcome(counted.frames, totals, seconds, status, message, tuple(made.source.warnings), has_film)
+
+
+def show(outcome: Outcome, folder: RunFolder, *, as_json: bool) -> None:
+    """Print the closing table, and on the last line of stdout the JSON object if asked."""
+    for warning in outcome.warnings:
+        print(f"perdure: note: {warning}", file=sys.stderr)
+    if outcome.message:
+        print(f"perdure: {outcome.message}", file=sys.stderr)
+    if outcome.status == "interrupted":
+        print(f"perdure: interrupted; everything so far is in {folder.path}", file=sys.stderr)
+    rate = outcome.frames / outcome.seconds if outcome.seconds > 0 else 0.0
+    if as_json:
+        value = {
+            "status": outcome.status,
+            "message": outcome.message,
+            "run": str(folder.path),
+            "frames": outcome.frames,
+            "seconds": round(outcome.seconds, 3),
+            "rate": round(rate, 2),
+            **dataclasses.asdict(outcome.totals),
+        }
+        print(json.dumps(value))
+        return
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_row("frames", str(outcome.frames))
+    table.add_row("tracks", f"{outcome.totals.tracks} ({outcome.totals.rows} rows)")
+    table.add_row("events", str(outcome.totals.events))
+    table.add_row("rate", f"{rate:.1f} frames/s")
+    table.add_row("results", str(folder.path / "tracks.txt"))
+    if outcome.has_film:
+        table.add_row("film", str(folder.film))
+    Console().print(table)
+
+
+class _Count:
+    """How many frames were logged, and the time of the last."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self._last = 0.0
+
+    def time(self, frame: Any) -> float:
+        if frame is not None:
+            self.frames += 1
+            self._last = frame.time
+        return self._last
+
+
+def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str, Any]:
+    source = made.source
+    return {
+        "source": str(source.origin),
+        "width": source.width,
+        "height": source.height,
+        "fps": source.fps,
+        "window": window,
+        "classes": list(made.classes),
+        "detector": {"name": made.detector_name, "parameters": params.values(made.detector)},
+        "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
+        "reporting": params.values(reporting),
+    }

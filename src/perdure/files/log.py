@@ -1,0 +1,143 @@
+"""The run log `tracks.jsonl`: a report a line, append-only; whatever byte it is cut off at, it is valid."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from perdure.errors import FormatError
+from perdure.files.lines import mask_of_json, mask_to_json, read_lines, short, short_row, to_line
+from perdure.files.whole import cannot_write
+from perdure.types import Dropped, Event, Explanation, Ground, Renamed, Report, Status, Tracks
+
+FORMAT, VERSION = "perdure-log", 1
+Json = Any
+
+
+class Entry(NamedTuple):
+    """One line of a log: the report of a frame; frame -1 for what was said when the run finished."""
+
+    frame: int
+    time: float
+    report: Report
+
+
+class RunLog:
+    """A log being written; every line is with the operating system before the next frame is read."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            self._file = path.open("w", encoding="utf-8", newline="\n", buffering=1)
+            self._file.write(to_line({"format": FORMAT, "version": VERSION}))
+        except OSError as error:
+            raise cannot_write(path, error) from error
+
+    def append(self, frame: int, time: float, report: Report) -> None:
+        """Write the report of one frame."""
+        try:
+            self._file.write(to_line(report_to_json(frame, time, report)))
+        except OSError as error:
+            raise cannot_write(self._path, error) from error
+
+    def __enter__(self) -> RunLog:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+
+def read_log(path: Path) -> Iterator[Entry]:
+    """Yield the entries of a log, in order.
+
+    Raises
+    ------
+    FormatError
+        Naming file and line, if the log is damaged elsewhere than at its cut-off end.
+    """
+    for number, _, value in read_lines(path, FORMAT, VERSION):
+        try:
+            entry = Entry(int(value["frame"]), float(value["time"]), report_of_json(value))
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
+            raise FormatError(f"{path}, line {number}: not a report ({error!r})") from error
+        yield entry
+
+
+def report_to_json(frame: int, time: float, report: Report) -> Json:
+    """Return a report as plain values; columns at their default are left out."""
+    value: dict[str, Json] = {"frame": frame, "time": time}
+    value["rows"] = [_row_to_json(report.rows, i, frame) for i in range(len(report.rows))]
+    if report.renamed:
+        value["renamed"] = [[one.old, one.new, one.begin, one.end] for one in report.renamed]
+    if report.dropped:
+        value["dropped"] = [[one.id, one.begin, one.end] for one in report.dropped]
+    if report.events:
+        value["events"] = [dataclasses.asdict(one) for one in report.events]
+    if report.explanations:
+        value["explanations"] = [
+            {"id": one.id, "why": one.why, "figures": dict(one.figures)} for one in report.explanations
+        ]
+    return value
+
+
+def report_of_json(value: Mapping[str, Json]) -> Report:
+    """Return the report that `report_to_json` wrote."""
+    frame, time = int(value["frame"]), float(value["time"])
+    return Report(
+        rows=_rows_of_json(value["rows"], frame, time),
+        renamed=tuple(Renamed(*map(int, one)) for one in value.get("renamed", ())),
+        dropped=tuple(Dropped(*map(int, one)) for one in value.get("dropped", ())),
+        events=tuple(Event(**{**one, "ids": tuple(map(int, one["ids"]))}) for one in value.get("events", ())),
+        explanations=tuple(Explanation(**one) for one in value.get("explanations", ())),
+    )
+
+
+def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:
+    row: dict[str, Json] = {"id": int(rows.ids[i]), "box": short_row(rows.boxes[i])}
+    if rows.frames[i] != frame:
+        row["frame"], row["time"] = int(rows.frames[i]), float(rows.times[i])
+    row["status"] = Status(rows.status[i]).word
+    row["confidence"] = short(rows.confidence[i])
+    believed, ground = rows.believed[i], rows.ground[i]
+    optional = {
+        "class": str(rows.classes[i]),
+        "group": int(rows.groups[i]),
+        "inferred": bool(rows.inferred[i]),
+        "hidden_side": str(rows.hidden_side[i]),
+        "links": list(rows.links[i]),
+        "ground": None if ground is None else list(ground),
+        "believed": None if believed is None else mask_to_json(believed),
+        "mask": mask_to_json(rows.masks[i]) if rows.masks[i].bits.size else None,
+    }
+    return row | {key: value for key, value in optional.items() if value}
+
+
+def _rows_of_json(rows: list[Json], frame: int, time: float) -> Tracks:
+    if not rows:
+        return Tracks.empty()
+    return Tracks.of(
+        frames=[row.get("frame", frame) for row in rows],
+        times=[row.get("time", time) for row in rows],
+        ids=[row["id"] for row in rows],
+        boxes=np.array([row["box"] for row in rows], np.float32),
+        status=[Status[row["status"].upper()] for row in rows],
+        confidence=[row["confidence"] for row in rows],
+        classes=[row.get("class", "") for row in rows],
+        groups=[row.get("group", 0) for row in rows],
+        inferred=[row.get("inferred", False) for row in rows],
+        hidden_side=[row.get("hidden_side", "") for row in rows],
+        links=[tuple(map(int, row.get("links", ()))) for row in rows],
+        ground=[Ground(*map(float, row["ground"])) if "ground" in row else None for row in rows],
+        believed=[mask_of_json(row["believed"]) if "believed" in row else None for row in rows],
+        masks=[mask_of_json(row.get("mask", _NO_MASK)) for row in rows],
+    )
+
+
+_NO_MASK = {"x": 0, "y": 0, "size": [0, 0], "runs": []}

@@ -1,0 +1,180 @@
+"""The run folder: `run.json`, `tracks.jsonl`, `tracks.txt`, `events.csv`, `tracked.mp4`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from perdure import __version__
+from perdure.errors import FormatError, OutputError
+from perdure.files.log import read_log
+from perdure.files.mot import write_rows
+from perdure.files.whole import cannot_write, whole_file
+from perdure.fold import Corrections, settle, settle_by_frame
+from perdure.params import parameter
+from perdure.types import Event, Tracks
+
+FORMAT, VERSION = "perdure-run", 1
+EVENT_COLUMNS = (
+    "kind",
+    "begin_frame",
+    "end_frame",
+    "begin_time",
+    "end_time",
+    "ids",
+    "zone",
+    "confidence",
+    "why",
+)
+PARTS = ("run.json", "tracks.jsonl", "tracks.txt", "events.csv", "tracked.mp4")
+
+
+@dataclass(frozen=True)
+class Reporting:
+    """Which rows of a run count."""
+
+    report_confidence: float = parameter(
+        0.5, "hidden targets surer than this are in tracks.txt and exports", low=0.0, high=1.0
+    )
+
+
+@dataclass(frozen=True)
+class Totals:
+    """What a finished run holds."""
+
+    rows: int  # that count
+    tracks: int  # ids among them
+    events: int
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The folder of one run, new or existing."""
+
+    path: Path
+
+    @staticmethod
+    def create(path: Path, *, overwrite: bool) -> RunFolder:
+        """Make the folder of a new run.
+
+        Raises
+        ------
+        OutputError
+            If it holds a run and `overwrite` is not asked, or if it holds anything else.
+        """
+        try:
+            there = {one.name for one in path.iterdir()} if path.is_dir() else set()
+            if path.exists() and not path.is_dir():
+                raise OutputError(f"{path} is a file; name a folder with -o")
+            if there - {".DS_Store"} and "run.json" not in there:
+                raise OutputError(f"{path} holds other files; name a new folder with -o")
+            if "run.json" in there and not overwrite:
+                raise OutputError(f"{path} holds a run already; add --overwrite, or name another folder with -o")
+            path.mkdir(parents=True, exist_ok=True)
+            for name in PARTS:
+                (path / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        return RunFolder(path)
+
+    @staticmethod
+    def open(path: Path) -> RunFolder:
+        """Return an existing run.
+
+        Raises
+        ------
+        FormatError
+            If there is none.
+        """
+        if not (path / "tracks.jsonl").is_file():
+            raise FormatError(f"{path} is not a run folder (no tracks.jsonl in it); `perdure track` makes one")
+        return RunFolder(path)
+
+    @property
+    def log(self) -> Path:
+        """The append-only log."""
+        return self.path / "tracks.jsonl"
+
+    @property
+    def film(self) -> Path:
+        """The drawn film."""
+        return self.path / "tracked.mp4"
+
+    def write_about(self, about: Mapping[str, Any]) -> None:
+        """Write `run.json`: what was run, with which parameters, how it ended."""
+        with whole_file(self.path / "run.json") as file:
+            json.dump({"format": FORMAT, "version": VERSION, "perdure": __version__, **about}, file, indent=2)
+            file.write("\n")
+
+    def read_about(self) -> dict[str, Any]:
+        """Return what `run.json` says; empty where it is missing."""
+        try:
+            about = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError) as error:
+            raise FormatError(f"cannot read {self.path / 'run.json'}: {error}") from error
+        return about if isinstance(about, dict) else {}
+
+    def settled_by_frame(self) -> Iterator[tuple[int, Tracks]]:
+        """Yield (frame, settled rows), all statuses, groups too; memory stays bounded."""
+        return settle_by_frame(lambda: (entry.report for entry in read_log(self.log)))
+
+    def tracks(self) -> Tracks:
+        """Return all settled rows at once."""
+        return settle(entry.report for entry in read_log(self.log))
+
+    def write_results(self, reporting: Reporting) -> Totals:
+        """Settle the log into `tracks.txt` and `events.csv`, streaming."""
+        rows, ids = 0, set()
+        with whole_file(self.path / "tracks.txt") as file:
+            for _, settled in self.settled_by_frame():
+                counted = settled.counted(reporting.report_confidence)
+                write_rows(file, counted)
+                rows += len(counted)
+                ids.update(counted.ids.tolist())
+        return Totals(rows, len(ids), self._write_events())
+
+    def _write_events(self) -> int:
+        corrections = Corrections.of(entry.report for entry in read_log(self.log))
+        clock = _Clock()
+        count = 0
+        with whole_file(self.path / "events.csv") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(EVENT_COLUMNS)
+            for number, entry in enumerate(read_log(self.log)):
+                clock.note(entry.frame, entry.time)
+                for event in entry.report.events:
+                    settled = corrections.event(event, number)
+                    if settled.ids or not event.ids:
+                        table.writerow(_event_row(settled, clock))
+                        count += 1
+        return count
+
+
+class _Clock:
+    """The times of all frames, 16 bytes each."""
+
+    def __init__(self) -> None:
+        self._frames, self._times = array("q"), array("d")
+
+    def note(self, frame: int, time: float) -> None:
+        if frame >= 0:  # the finishing entry has no frame
+            self._frames.append(frame)
+            self._times.append(time)
+
+    def at(self, frame: int) -> float:
+        place = bisect_left(self._frames, frame)
+        return self._times[min(place, len(self._times) - 1)] if self._times else 0.0
+
+
+def _event_row(event: Event, clock: _Clock) -> list[object]:
+    ids = " ".join(str(one) for one in event.ids)
+    begin, end = f"{clock.at(event.begin):.3f}", f"{clock.at(event.end):.3f}"
+    return [event.kind, event.begin, event.end, begin, end, ids, event.zone, f"{event.confidence:g}", event.why]

@@ -1,0 +1,228 @@
+"""A source, a detector and a tracker joined into one run, by name and parameters."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure import fold, params
+from perdure.detect import DETECTORS, Recorded
+from perdure.errors import DamagedVideo, FormatError, ParameterError
+from perdure.files.regions import read_regions
+from perdure.files.roi import read_roi
+from perdure.files.video import Source, open_source
+from perdure.trackers import TRACKERS
+from perdure.types import Frame, Regions, Report, Scene, Tracks
+
+FIRST_LOOKS = 25  # frames spread over a file that a detector may see first
+
+AnySource = str | Path | int | Iterable[NDArray[np.uint8]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything a run needs, checked, before its first frame."""
+
+    source: Source
+    scene: Scene
+    detector_name: str
+    detector: Any
+    tracker_name: str
+    tracker: Any
+    classes: tuple[str, ...]
+
+    def prepared(self) -> Plan:
+        """Return the plan with the detector's first look over the source taken, where both allow it."""
+        if not (self.source.rereadable and self.source.has_images and hasattr(self.detector, "prepare")):
+            return self
+        looked = self.detector.prepare(self.source.sample(FIRST_LOOKS))
+        return Plan(**{**self.__dict__, "detector": looked})
+
+    def seen(self, frames: Iterable[Frame] | None = None) -> Iterator[tuple[Frame, Regions]]:
+        """Yield every frame with its regions, of the wanted classes only."""
+        seen = fold.detect(self.source if frames is None else frames, self.detector, self.scene)
+        return _of_classes(seen, self.classes) if self.classes else seen
+
+    def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
+        """Yield every step of the run, the finishing one last."""
+        return fold.track(self.seen(frames), self.tracker, self.scene)
+
+
+def plan(
+    source: AnySource,
+    *,
+    tracker: str = "overlap",
+    detector: str | Path | None = None,
+    fps: float | None = None,
+    start: str | float | None = None,
+    end: str | float | None = None,
+    stride: int = 1,
+    roi: str | None = None,
+    classes: Collection[str] = (),
+    parameters: Mapping[str, object] | None = None,
+) -> Plan:
+    """Open a source and make the detector and tracker for it.
+
+    Parameters
+    ----------
+    source : str, Path, int or iterable of (H, W, 3) uint8 arrays
+        A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
+    tracker : str
+        A name of `perdure.trackers.TRACKERS`.
+    detector : str, Path or None
+        'background', or a file of regions (`.jsonl` of `perdure detect`, or MOTChallenge `.txt`);
+        None for the background, or for `det/det.txt` of a MOTChallenge folder without images.
+    fps : float or None
+        Frames per second, where the source has none or a wrong one.
+    start, end : str, float or None
+        Seconds, 'mm:ss', 'h:mm:ss', or a frame as '300f'; start inclusive, end exclusive.
+    stride : int
+        Take every n-th frame.
+    roi : str or None
+        Where things may be seen: an image, a polygon, a box or a file of polygons.
+    classes : collection of str
+        Only regions of these classes.
+    parameters : mapping
+        Values of the detector's and tracker's parameters by name.
+
+    Raises
+    ------
+    VideoError, FormatError, ParameterError
+        The caller's mistake, in one line.
+    """
+    if tracker not in TRACKERS:
+        raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
+    name = detector_name(detector)
+    of_tracker, of_detector = split(parameters or {}, tracker, name)
+    made_tracker = params.build(TRACKERS[tracker], of_tracker)
+    opened = open_source(source, fps=fps, start=start, end=end, stride=stride)
+    if detector is None and not opened.has_images:
+        detector, name = _own_detections(opened), "recorded"
+        of_tracker, of_detector = split(parameters or {}, tracker, name)
+    made_detector = params.build(DETECTORS[name], of_detector)
+    if name == "recorded":
+        made_detector = Recorded(**params.values(made_detector), regions_of=read_regions(Path(str(detector))))  # type: ignore[arg-type]
+    for what, made in (("detector", made_detector), ("tracker", made_tracker)):
+        if made.needs_pixels and not opened.has_images:
+            raise ParameterError(f"{opened.name} has no images and this {what} needs them; name a --detector FILE")
+    if classes and name == "background":
+        raise ParameterError("the background detector names no classes; leave out --class or give --detector FILE")
+    scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
+    return Plan(opened, scene, name, made_detector, tracker, made_tracker, tuple(classes))
+
+
+def track(source: AnySource, **options: Any) -> Tracks:
+    """Track every moving thing in a source and return the settled tracks.
+
+    Takes the options of `plan`; parameters of detector and tracker may be given by name.
+    A damaged video gives a warning and the tracks of everything before the damage.
+
+    >>> blank = np.zeros((48, 64, 3), np.uint8)
+    >>> len(track([blank, blank, blank], patience=2.0))
+    0
+    """
+    made = plan(source, **_sorted_options(options))
+    reports: list[Report] = []
+    try:
+        for step in made.prepared().steps():
+            reports.append(step.report)
+    except DamagedVideo as damage:
+        warnings.warn(str(damage), RuntimeWarning, stacklevel=2)
+    finally:
+        made.source.close()
+    return fold.settle(reports)
+
+
+def follow(source: AnySource, **options: Any) -> Iterator[fold.Step]:
+    """Yield (frame, regions, report) as each frame comes, for live use; options as for `track`.
+
+    >>> blank = np.zeros((48, 64, 3), np.uint8)
+    >>> [len(step.report.rows) for step in follow([blank, blank])]
+    [0, 0, 0]
+    """
+    made = plan(source, **_sorted_options(options))
+    try:
+        yield from made.prepared().steps()
+    finally:
+        made.source.close()
+
+
+def detector_name(detector: str | Path | None) -> str:
+    """Return which kind of detector the user's word means."""
+    if detector is None or str(detector) == "background":
+        return "background"
+    if Path(str(detector)).is_file():
+        return "recorded"
+    if Path(str(detector)).suffix in (".txt", ".jsonl", ".csv"):
+        raise FormatError(f"{detector}: there is no such file of detections")
+    known = [name for name in DETECTORS if name != "recorded"]
+    raise ParameterError(f"{params.unknown_name('detector', str(detector), known)}, or name a file of detections")
+
+
+class Split(NamedTuple):
+    """Named values divided between tracker and detector."""
+
+    tracker: dict[str, object]
+    detector: dict[str, object]
+
+
+def split(given: Mapping[str, object], tracker: str, detector: str) -> Split:
+    """Divide named values between tracker and detector.
+
+    Raises
+    ------
+    ParameterError
+        For a name that neither has, with who has it or the nearest one.
+    """
+    owners = {
+        one.name: part
+        for part, kind in (("tracker", TRACKERS[tracker]), ("detector", DETECTORS[detector]))
+        for one in params.describe(kind)
+    }
+    divided = Split({}, {})
+    for name, value in given.items():
+        if name not in owners:
+            raise ParameterError(_stranger(name, owners, tracker, detector))
+        getattr(divided, owners[name])[name] = value
+    return divided
+
+
+def _stranger(name: str, owners: Mapping[str, str], tracker: str, detector: str) -> str:
+    for what, kinds in (("tracker", TRACKERS), ("detector", DETECTORS)):
+        for other, kind in kinds.items():
+            if name in {one.name for one in params.describe(kind)}:
+                return f"{name!r} belongs to the {what} {other!r}, which this run does not use"
+    return params.unknown_name(f"parameter of the tracker {tracker!r} or the detector {detector!r}", name, owners)
+
+
+def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Keep the options of `plan`; all else are parameters by name."""
+    own = {key: value for key, value in options.items() if key in _OPTIONS}
+    others = {key: value for key, value in options.items() if key not in _OPTIONS}
+    return {**own, "parameters": {**(own.get("parameters") or {}), **others}}
+
+
+_OPTIONS = frozenset(("tracker", "detector", "fps", "start", "end", "stride", "roi", "classes", "parameters"))
+
+
+def _own_detections(source: Source) -> Path:
+    """Return det/det.txt of a MOTChallenge folder without images."""
+    folder = (source.folder or Path()) / "det"
+    if (folder / "det.txt").is_file():
+        return folder / "det.txt"
+    there = sorted(str(one) for one in folder.glob("det*.txt"))
+    hint = f"name one with --detector: {', '.join(there)}" if there else "name a file with --detector"
+    raise ParameterError(f"{source.name} has no images and no det/det.txt; {hint}")
+
+
+def _of_classes(
+    seen: Iterable[tuple[Frame, Regions]], classes: tuple[str, ...]
+) -> Iterator[tuple[Frame, Regions]]:
+    for frame, regions in seen:
+        yield frame, regions.take(np.isin(regions.classes, classes))

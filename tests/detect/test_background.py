@@ -1,0 +1,82 @@
+"""What the plain background model sees, in drawn rooms."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from worlds import Block, World, lone_walker, walk
+
+from perdure.detect.background import Background, exposure
+from perdure.errors import ParameterError
+from perdure.types import Frame, Regions, Scene
+
+
+def regions_of(world: World, detector: Background | None = None, frames=None) -> list[Regions]:
+    detector = detector or Background()
+    state = detector.start(world.scene)
+    found = []
+    for frame in frames or world.frames():
+        state, regions = detector.step(state, frame)
+        found.append(regions)
+    return found
+
+
+def test_a_walker_is_one_region_close_to_where_she_is():
+    world = lone_walker()
+    for k, regions in enumerate(regions_of(world)):
+        there = world.truth().in_frame(k).boxes
+        assert len(regions) == len(there)
+        assert np.abs(regions.boxes - there).max(initial=0) <= 2
+
+
+def test_a_clip_that_begins_with_somebody_in_it_leaves_no_ghost_after_a_first_look():
+    world = World((Block(walk((5, 30), (2, 0))),))
+    detector = Background().prepare(world.frames()[::4])
+    for k, regions in enumerate(regions_of(world, detector)):
+        assert len(regions) == len(world.truth().in_frame(k))
+
+
+def test_live_a_ghost_heals_after_a_while():
+    world = World((Block(walk((5, 30), (2, 0))),), count=400)
+    found = regions_of(world, Background(absorb=10.0))
+    assert len(found[20]) == 2, "the ghost and the walker"
+    assert len(found[-1]) == 0
+
+
+def test_a_change_of_exposure_is_not_a_region():
+    world = lone_walker()
+    dimmed = [
+        frame if k < 20 else dataclasses.replace(frame, image=(frame.image * 0.6).astype(np.uint8))
+        for k, frame in enumerate(world.frames())
+    ]
+    assert [len(regions) for regions in regions_of(world, frames=dimmed)] == [0] * 3 + [1] * 37
+
+
+def test_exposure_is_one_on_a_still_scene_and_the_factor_otherwise():
+    mean = np.full((90, 120, 3), 100.0, np.float32)
+    assert exposure(np.full((90, 120, 3), 100, np.uint8), mean).tolist() == [1, 1, 1]
+    assert exposure(np.full((90, 120, 3), 50, np.uint8), mean) == pytest.approx([2, 2, 2])
+
+
+def test_noise_alone_is_not_a_region():
+    rng = np.random.default_rng(3)
+    room = [Frame(k, k / 10, rng.normal(100, 4, (80, 120, 3)).clip(0, 255).astype(np.uint8)) for k in range(40)]
+    assert not any(len(regions) for regions in regions_of(lone_walker(), frames=room))
+
+
+def test_somebody_who_stands_for_ten_seconds_is_still_seen():
+    world = World((Block(lambda k: None if k < 3 else (min(5 + 2 * k, 50), 30)),), count=130)
+    assert all(len(regions) == 1 for regions in regions_of(world)[4:])
+
+
+def test_a_frame_without_a_picture_is_refused_with_what_to_do():
+    detector = Background()
+    with pytest.raises(ParameterError, match="--detector"):
+        detector.step(detector.start(Scene(64, 48)), Frame(0, 0.0))
+
+
+def test_few_frames_say_nothing_about_the_whole():
+    detector = Background()
+    assert detector.prepare(lone_walker().frames()[:2]) is detector

@@ -1,0 +1,20 @@
+"""Run one tracker over a drawn world into a folder: `one_run.py TRACKER FOLDER THREADS`."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import cv2  # noqa: E402
+from worlds import crossing  # noqa: E402
+
+from perdure import pipeline  # noqa: E402
+from perdure.cli.track import run  # noqa: E402
+from perdure.files.runs import Reporting, RunFolder  # noqa: E402
+
+if __name__ == "__main__":
+    tracker, folder, threads = sys.argv[1:]
+    cv2.setNumThreads(int(threads))
+    world = crossing()
+    plan = pipeline.plan([frame.image for frame in world.frames()], tracker=tracker, fps=world.fps)
+    run(plan, RunFolder.create(Path(folder), overwrite=False), Reporting(), film=False)

@@ -1,0 +1,130 @@
+"""The laws of the house, on every detector."""
+
+from __future__ import annotations
+
+import typing
+
+import numpy as np
+import pytest
+from worlds import WORLDS, World, lone_walker, two_apart
+
+from perdure import params, states
+from perdure.detect import DETECTORS
+from perdure.errors import ParameterError
+from perdure.types import Frame, Mask, Regions, Scene
+
+pytestmark = pytest.mark.parametrize("kind", DETECTORS.values(), ids=list(DETECTORS))
+every_world = pytest.mark.parametrize("world", [make() for make in WORLDS.values()], ids=list(WORLDS))
+
+
+def detector_for(kind, world: World):
+    """A detector that can work in this world: a recorded one gets the world's own regions."""
+    if "regions_of" in kind.__dataclass_fields__:
+        seen = {frame.index: regions for frame, regions in world.seen()}
+        return kind(regions_of=lambda index: seen.get(index, Regions.empty()))
+    return kind()
+
+
+def run(detector, frames, scene, state=None) -> tuple[object, list[Regions]]:
+    state = detector.start(scene) if state is None else state
+    found = []
+    for frame in frames:
+        state, regions = detector.step(state, frame)
+        found.append(regions)
+    return state, found
+
+
+def same(left: list[Regions], right: list[Regions]) -> bool:
+    return len(left) == len(right) and all(one.equals(other) for one, other in zip(left, right, strict=True))
+
+
+@every_world
+def test_a_run_resumed_from_a_saved_state_is_the_same_run(kind, world: World):
+    detector, frames = detector_for(kind, world), world.frames()
+    state_kind = typing.get_type_hints(kind.start)["return"]
+    _, whole = run(detector, frames, world.scene)
+    for stop in (0, 1, 7, world.count // 2):
+        state, before = run(detector, frames[:stop], world.scene)
+        state = states.load(states.save(state), state_kind)
+        _, after = run(detector, frames[stop:], world.scene, state)
+        assert same(whole, before + after), f"resumed at frame {stop}"
+
+
+def test_videos_woven_in_one_process_do_not_see_each_other(kind):
+    worlds = (lone_walker(), two_apart())
+    detectors = [detector_for(kind, world) for world in worlds]
+    apart = [
+        run(detector, world.frames(), world.scene)[1] for detector, world in zip(detectors, worlds, strict=True)
+    ]
+    state_of = [detector.start(world.scene) for detector, world in zip(detectors, worlds, strict=True)]
+    woven: list[list[Regions]] = [[], []]
+    for pair in zip(*(world.frames() for world in worlds), strict=True):
+        for number, frame in enumerate(pair):
+            state_of[number], regions = detectors[number].step(state_of[number], frame)
+            woven[number].append(regions)
+    assert same(apart[0], woven[0])
+    assert same(apart[1], woven[1])
+
+
+@every_world
+def test_step_does_not_change_the_frame(kind, world: World):
+    detector = detector_for(kind, world)
+    state = detector.start(world.scene)
+    for frame in world.frames():
+        before = frame.image.copy()
+        state, _ = detector.step(state, frame)
+        assert np.array_equal(frame.image, before)
+
+
+@every_world
+def test_masks_are_disjoint_tight_and_in_their_boxes(kind, world: World):
+    _, found = run(detector_for(kind, world), world.frames(), world.scene)
+    assert any(len(regions) for regions in found)
+    for regions in found:
+        pictures = [mask.to_image(world.height, world.width) for mask in regions.masks]
+        assert not len(regions) or np.sum(pictures, axis=0).max() <= 1
+        for picture, box in zip(pictures, regions.boxes, strict=True):
+            assert Mask.of_image(picture).box == tuple(box)
+
+
+def test_nothing_is_seen_outside_the_roi(kind):
+    world = two_apart()
+    roi = np.zeros((world.height, world.width), bool)
+    roi[: world.height // 2] = True
+    _, found = run(detector_for(kind, world), world.frames(), Scene(world.width, world.height, world.fps, roi=roi))
+    assert any(len(regions) for regions in found)
+    for regions in found:
+        assert (regions.boxes[:, 3] <= world.height // 2).all()
+
+
+def test_a_mirrored_film_gives_mirrored_regions(kind):
+    world = two_apart()
+    detector = detector_for(kind, world)
+    if not detector.needs_pixels:
+        pytest.skip("looks at no pixels: there is nothing to mirror")
+    _, plain = run(detector, world.frames(), world.scene)
+    flipped = [Frame(frame.index, frame.time, frame.image[:, ::-1].copy()) for frame in world.frames()]
+    _, mirrored = run(detector, flipped, world.scene)
+    for one, other in zip(plain, mirrored, strict=True):
+        back = {(world.width - b[2], b[1], world.width - b[0], b[3]) for b in other.boxes.tolist()}
+        assert {tuple(box) for box in one.boxes.tolist()} == back
+
+
+def test_the_state_stays_bounded_on_an_endless_film(kind):
+    world = lone_walker()
+    detector = detector_for(kind, world)
+    state, _ = run(detector, world.frames(), world.scene)
+    early = len(states.save(state))
+    later = [Frame(40 + k, (40 + k) / 10, world.frames()[k % 40].image) for k in range(160)]
+    state, _ = run(detector, later, world.scene, state)
+    assert len(states.save(state)) <= early + 64
+
+
+def test_a_parameter_out_of_range_is_refused_by_name_value_and_range(kind):
+    for declared in params.describe(kind):
+        for wrong in (declared.low - 1, declared.high + 1):
+            if declared.kind in (int, float) and np.isfinite(wrong):
+                with pytest.raises(ParameterError, match=declared.name):
+                    params.build(kind, {declared.name: declared.kind(wrong)})
+        with pytest.raises(ParameterError, match=declared.name):
+            params.build(kind, {declared.name: "nonsense" if declared.kind is not str else 3})

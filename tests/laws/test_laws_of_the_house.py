@@ -1,0 +1,117 @@
+"""The laws that no single tracker or detector can keep: imports, names, bytes, distributions."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.metadata
+import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import perdure
+from perdure import params
+from perdure.detect import DETECTORS
+from perdure.trackers import TRACKERS
+
+HOUSE = Path(perdure.__file__).parent
+FLOORS = {
+    "types": 0, "params": 0, "errors": 0, "states": 0,
+    "maths": 1, "features": 2, "scene": 2, "detect": 3, "trackers": 3,
+    "fold": 4, "learn": 4, "metrics": 4, "files": 4, "draw": 4, "figures": 4, "scenery": 4, "demo": 4,
+    "pipeline": 5, "online": 5, "cluster": 5, "web": 5, "cli": 5, "__init__": 5,
+}  # fmt: skip
+
+
+def modules() -> list[Path]:
+    return sorted(HOUSE.rglob("*.py"))
+
+
+def room(path: Path) -> str:
+    return path.relative_to(HOUSE).parts[0].removesuffix(".py")
+
+
+def imported_rooms(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "perdure":
+            parts = node.module.split(".")[1:]
+            found |= {parts[0]} if parts else {one.name for one in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {one.name.split(".")[1] for one in node.names if one.name.startswith("perdure.")}
+    return found - {"__version__"}
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(HOUSE)))
+def test_imports_point_down(path: Path):
+    if path.name == "__init__.py" and path.parent == HOUSE:
+        return  # the public names come from everywhere
+    for other in imported_rooms(path):
+        assert FLOORS[other] <= FLOORS[room(path)], f"{path} imports {other} from a floor above"
+
+
+@pytest.mark.parametrize("path", sorted((HOUSE / "trackers").glob("[!_]*.py")), ids=lambda path: path.stem)
+def test_no_tracker_imports_another(path: Path):
+    text = path.read_text()
+    others = {one.stem for one in (HOUSE / "trackers").glob("[!_]*.py")} - {path.stem}
+    assert not any(f"perdure.trackers.{other}" in text for other in others)
+
+
+def test_only_the_rooms_for_files_open_files():
+    for path in modules():
+        if room(path) in ("files", "cli", "web", "cluster"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            called = node.func if isinstance(node, ast.Call) else None
+            name = getattr(called, "id", getattr(called, "attr", ""))
+            assert name not in ("open", "imread", "imwrite", "read_text", "write_text"), f"{path} opens a file"
+
+
+def test_importing_the_package_loads_neither_numba_nor_cv2():
+    code = "import sys, perdure; print([name for name in ('numba', 'cv2', 'av', 'scipy') if name in sys.modules])"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed.strip() == "[]"
+
+
+def test_no_two_parameters_of_one_run_share_a_name():
+    for tracker, detector in itertools.product(TRACKERS.values(), DETECTORS.values()):
+        names = [one.name for kind in (tracker, detector) for one in params.describe(kind)]
+        assert len(names) == len(set(names))
+
+
+def test_every_parameter_says_what_it_means():
+    for kind in (*TRACKERS.values(), *DETECTORS.values()):
+        for one in params.describe(kind):
+            assert len(one.help) > 10
+            assert one.range_text or one.kind is bool
+
+
+@pytest.mark.parametrize("tracker", TRACKERS)
+def test_the_same_input_gives_the_same_bytes_in_any_process_with_any_number_of_threads(tmp_path: Path, tracker):
+    program = Path(__file__).parent / "one_run.py"
+    digests = set()
+    for threads, seed in (("1", "1"), ("2", "77")):
+        settings = {"OMP_NUM_THREADS": threads, "NUMBA_NUM_THREADS": threads, "PYTHONHASHSEED": seed}
+        folder = tmp_path / threads
+        subprocess.run(
+            [sys.executable, str(program), tracker, str(folder), threads],
+            env={**os.environ, **settings},
+            check=True,
+        )
+        contents = b"".join((folder / name).read_bytes() for name in ("tracks.jsonl", "tracks.txt", "events.csv"))
+        assert len(contents) > 2000
+        digests.add(hashlib.sha256(contents).hexdigest())
+    assert len(digests) == 1
+
+
+def test_only_one_installed_distribution_brings_cv2():
+    bringers = {
+        distribution.metadata["Name"]
+        for distribution in importlib.metadata.distributions()
+        if any(file.parts[0] == "cv2" for file in distribution.files or ())
+    }
+    assert bringers == {"opencv-contrib-python-headless"}, f"{bringers} all bring cv2 and break each other"
