@@ -59,7 +59,7 @@ def read_detections(path: Path) -> Mapping[int, Regions]:
     boxes = _boxes(table)
     order = np.argsort(table[:, 0], kind="stable")
     frames, starts = np.unique(table[order, 0], return_index=True)
-    groups = np.split(order, starts[1:])
+    groups = np.split(order, starts[1:]) if len(frames) else []
     return {
         int(frame) - 1: Regions.of(boxes[rows], scores=scores[rows])
         for frame, rows in zip(frames, groups, strict=True)

@@ -1,0 +1,91 @@
+"""`update`, in the ecosystem's habit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import supervision
+
+import perdure
+from perdure.errors import ParameterError
+from perdure.types import Regions
+
+BOXES = np.float32([[100, 10, 120, 40], [10, 10, 30, 40]])
+
+
+def detections(shift: float = 0.0) -> supervision.Detections:
+    return supervision.Detections(
+        xyxy=BOXES + shift,
+        confidence=np.float32([0.9, 0.8]),
+        class_id=np.array([2, 0]),
+        data={"class_name": np.array(["car", "person"]), "speed": np.array([3.0, 4.0])},
+    )
+
+
+def test_supervision_goes_in_and_out_with_order_and_data_kept():
+    tracker = perdure.Online("overlap", fps=10)
+    for k in range(6):
+        given = detections(k)
+        got = tracker.update(given)
+    assert got.xyxy.tolist() == given.xyxy.tolist()
+    assert got.data["speed"].tolist() == [3.0, 4.0]
+    assert got.class_id.tolist() == [2, 0]
+    assert sorted(got.tracker_id.tolist()) == [1, 2]
+    assert given.tracker_id is None, "what the caller gave stays as it is"
+
+
+def test_a_detection_without_an_identity_yet_is_minus_one():
+    assert perdure.Online("overlap", fps=10).update(detections()).tracker_id.tolist() == [-1, -1]
+
+
+def test_masks_of_supervision_are_kept_as_silhouettes():
+    bits = np.zeros((2, 60, 160), bool)
+    bits[0, 12:30, 101:110] = bits[1, 12:30, 11:20] = True
+    tracker = perdure.Online("overlap", fps=10, confirm=0.0)
+    tracker.update(supervision.Detections(xyxy=BOXES, mask=bits))
+    assert sorted(mask.box for mask in tracker.report.rows.masks) == [(11, 12, 20, 30), (101, 12, 110, 30)]
+
+
+def test_no_detections_are_a_value():
+    tracker = perdure.Online("overlap")
+    assert len(tracker.update(supervision.Detections.empty())) == 0
+    assert len(tracker.update([])) == 0
+    assert len(tracker.update(Regions.empty())) == 0
+
+
+def test_arrays_may_bring_scores_and_class_numbers():
+    tracker = perdure.Online("overlap", confirm=0.0)
+    rows = tracker.update(np.array([[10, 10, 30, 40, 0.5, 7]]))
+    assert (rows.confidence.tolist(), rows.classes.tolist()) == ([0.5], ["7"])
+
+
+def test_two_trackers_in_one_process_both_begin_at_one():
+    for _ in range(2):
+        assert perdure.Online("overlap", confirm=0.0).update(BOXES[:1]).ids.tolist() == [1]
+
+
+def test_reset_forgets_everything():
+    tracker = perdure.Online("overlap", confirm=0.0)
+    tracker.update(BOXES)
+    tracker.reset()
+    assert tracker.update(BOXES[:1], timestamp=0.0).ids.tolist() == [1]
+
+
+def test_timestamps_must_rise():
+    tracker = perdure.Online("overlap")
+    tracker.update(BOXES, timestamp=5.0)
+    with pytest.raises(ParameterError, match="must rise"):
+        tracker.update(BOXES, timestamp=5.0)
+
+
+@pytest.mark.parametrize("wrong", ["text", np.zeros((2, 3)), np.zeros((2, 9)), [[1, 2, np.nan, 4]], {"a": 1}])
+def test_what_are_no_detections_is_refused_with_what_would_do(wrong):
+    with pytest.raises(ParameterError):
+        perdure.Online("overlap").update(wrong)
+
+
+def test_an_unknown_tracker_or_parameter_is_refused_with_the_nearest():
+    with pytest.raises(ParameterError, match="did you mean 'overlap'"):
+        perdure.Online("overlaps")
+    with pytest.raises(ParameterError, match="did you mean 'patience'"):
+        perdure.Online("overlap", patients=2.0)
