@@ -19,7 +19,7 @@ class Example:
 
 
 def test_help_tells_meaning_range_unit_and_symbol():
-    assert describe(Example)[0].full_help == "how long an unseen target is kept [≥ 0 s; τ in the paper]"
+    assert describe(Example)[0].full_help == "how long an unseen target is kept (≥ 0 s; τ in the paper)"
     assert describe(Example)[1].range_text == "1 to 9"
 
 

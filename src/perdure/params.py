@@ -64,7 +64,7 @@ class Parameter:
     def full_help(self) -> str:
         """Meaning, range with unit, and the paper's symbol, in one line."""
         notes = [text for text in (self.range_text, self.symbol and f"{self.symbol} in the paper") if text]
-        return f"{self.help} [{'; '.join(notes)}]" if notes else self.help
+        return f"{self.help} ({'; '.join(notes)})" if notes else self.help
 
 
 def parameter(

@@ -23,21 +23,26 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+    rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (track, detect, draw, export, demo):
     app.command()(command)
 
 
-@app.callback()
-def about(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and end.", is_eager=True)] = False,
-) -> None:
-    """Follow every moving thing in a video, on an ordinary CPU, with no training."""
-    if version:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         print(f"perdure {__version__}")
         raise typer.Exit
+
+
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and end.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Follow every moving thing in a video, on an ordinary CPU, with no training."""
 
 
 def main() -> None:

@@ -139,10 +139,18 @@ def _option(declared: params.Parameter, owners: list[str]) -> inspect.Parameter:
     """The keyword of a command that stands for one parameter; None where it is not given."""
     flag = declared.name.replace("_", "-")
     names = [f"--{flag}/--no-{flag}"] if declared.kind is bool else [f"--{flag}"]
-    text = f"{declared.full_help} (default: {declared.default:g})" if _is_number(declared) else declared.full_help
-    option = typer.Option(*names, help=text, show_default=False, rich_help_panel=" · ".join(owners))
+    default = f"{declared.default:g}" if _is_number(declared) else str(declared.default).lower()
+    notes = "; ".join(part for part in (declared.range_text, f"default {default}") if part)
+    text = f"{declared.help[0].upper()}{declared.help[1:]} ({notes})."
+    option = typer.Option(*names, help=text, show_default=False, rich_help_panel=_heading(owners))
     annotation: Any = Annotated[Optional[declared.kind], option]  # noqa: UP045
     return inspect.Parameter(declared.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+def _heading(owners: list[str]) -> str:
+    """The panel of the help: 'Detector background', 'What counts', several joined."""
+    names = " · ".join(owners)
+    return names[0].upper() + names[1:]
 
 
 def _is_number(declared: params.Parameter) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import cv2
@@ -93,7 +94,7 @@ class Background:
         """Return the state before the first frame: nothing learnt, or the first look."""
         mean, variance, age = np.zeros((0, 0, 3), np.float32), np.zeros((0, 0), np.float32), 0.0
         if self.first_look is not None:
-            mean, variance, age = self.first_look.mean.copy(), self.first_look.variance.copy(), self.memory
+            mean, variance, age = self.first_look.mean.copy(), self.first_look.variance.copy(), self.absorb
         return BackgroundState(mean, variance, age, -1.0 / scene.fps, scene.roi, scene.height, scene.fps)
 
     def step(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, Regions]:
@@ -104,6 +105,14 @@ class Background:
         ParameterError
             If the frame has no picture.
         """
+        state, foreground = self.foreground(state, frame)
+        found = components(
+            clean(foreground, round(self.closing * state.height)), self.least_area * foreground.size, state.roi
+        )
+        return state, found
+
+    def foreground(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, NDArray[np.uint8]]:
+        """Return the raw foreground of one frame, (H, W) 0 or 255; the model learns from it."""
         if frame.image is None:
             raise ParameterError("the background detector needs pictures; give --detector a file of detections")
         image = _smooth(frame.image)
@@ -112,10 +121,7 @@ class Background:
             state = dataclasses.replace(state, mean=image.astype(np.float32), variance=first)
         elapsed = max(frame.time - state.time, 0.1 / state.fps)
         foreground = self._compare_and_learn(state, image, elapsed)
-        found = components(
-            clean(foreground, round(self.closing * state.height)), self.least_area * foreground.size, state.roi
-        )
-        return dataclasses.replace(state, age=state.age + elapsed, time=frame.time), found
+        return dataclasses.replace(state, age=state.age + elapsed, time=frame.time), foreground
 
     def _compare_and_learn(self, state: BackgroundState, image: Image, elapsed: float) -> NDArray[np.uint8]:
         from perdure.maths.kernels.gaussian import compare_and_learn
@@ -148,12 +154,16 @@ def look_over(images: NDArray[np.uint8]) -> FirstLook:
     half = len(images) // 2
     mean = np.empty(images.shape[1:], np.float32)
     variance = np.empty(images.shape[1:3], np.float32)
-    for y in range(0, images.shape[1], _STRIP):  # in strips that stay in the cache
+
+    def look(y: int) -> None:
         strip = images[:, y : y + _STRIP]  # (N, strip, W, 3)
         middle = np.partition(strip, half, axis=0)[half]
         deviation = np.partition(np.maximum(strip, middle) - np.minimum(strip, middle), half, axis=0)[half]
         mean[y : y + _STRIP] = middle
         variance[y : y + _STRIP] = np.square(deviation * _GAUSSIAN).mean(axis=2)
+
+    with ThreadPoolExecutor(2) as threads:  # strips that stay in the cache; each writes its own rows
+        list(threads.map(look, range(0, images.shape[1], _STRIP)))
     return FirstLook(mean, variance)
 
 
@@ -172,7 +182,7 @@ def exposure(image: Image, mean: Single) -> Single:
 _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
 _HEALING = 5.0  # s over which a model that has seen nothing yet takes in what stands still
 _STRIP = 32  # rows
-_GRID = 72  # rows of the grid on which the exposure is measured
+_GRID = 48  # rows of the grid on which the exposure is measured
 _GAUSSIAN = 1.4826  # standard deviation of a Gaussian / its median absolute deviation
 
 

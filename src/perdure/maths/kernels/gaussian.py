@@ -27,7 +27,7 @@ def compare_and_learn(
     Parameters
     ----------
     image : (H, W, 3) uint8
-        The picture.
+        The picture; this and the other arrays contiguous.
     exposure : (3,) float32
         What each channel is multiplied by before it is compared.
     mean : (H, W, 3) float32, changed
@@ -42,22 +42,22 @@ def compare_and_learn(
         In [0, 1]: how far background and foreground pixels move towards what they see.
     """
     third = np.float32(1.0) / np.float32(3.0)
-    for y in range(image.shape[0]):
-        for x in range(image.shape[1]):
-            red = np.float32(image[y, x, 0]) * exposure[0] - mean[y, x, 0]
-            green = np.float32(image[y, x, 1]) * exposure[1] - mean[y, x, 1]
-            blue = np.float32(image[y, x, 2]) * exposure[2] - mean[y, x, 2]
-            squared = (red * red + green * green + blue * blue) * third
-            if squared > squared_threshold * max(variance[y, x], least_variance):
-                foreground[y, x] = 255
-                step = foreground_rate
-            else:
-                foreground[y, x] = 0
-                step = rate
-                variance[y, x] += rate * (squared - variance[y, x])
-            mean[y, x, 0] += step * red
-            mean[y, x, 1] += step * green
-            mean[y, x, 2] += step * blue
+    first, second, last = exposure[0], exposure[1], exposure[2]
+    colours, means = image.reshape(-1), mean.reshape(-1)  # (3 H W,), views: one flat loop becomes vector code
+    variances, marks = variance.reshape(-1), foreground.reshape(-1)  # (H W,)
+    for i in range(variances.shape[0]):
+        red = np.float32(colours[3 * i]) * first - means[3 * i]
+        green = np.float32(colours[3 * i + 1]) * second - means[3 * i + 1]
+        blue = np.float32(colours[3 * i + 2]) * last - means[3 * i + 2]
+        squared = (red * red + green * green + blue * blue) * third
+        known = variances[i]
+        moving = squared > squared_threshold * max(known, least_variance)
+        marks[i] = 255 if moving else 0
+        step = foreground_rate if moving else rate
+        variances[i] = known + (np.float32(0.0) if moving else rate * (squared - known))
+        means[3 * i] += step * red
+        means[3 * i + 1] += step * green
+        means[3 * i + 2] += step * blue
 
 
 def compare_and_learn_twin(
