@@ -15,7 +15,8 @@ def test_the_kernel_and_its_twin_agree_in_every_bit(seed, height, width):
     mean = rng.uniform(0, 255, (height, width, 3)).astype(np.float32)
     variance = rng.uniform(0, 900, (height, width)).astype(np.float32)
     numbers = [
-        np.float32(value) for value in (rng.uniform(1, 20), rng.uniform(1, 50), rng.uniform(), rng.uniform())
+        np.float32(value)
+        for value in (rng.uniform(1, 20), rng.uniform(1, 50), rng.uniform(), rng.uniform(), rng.uniform())
     ]
     results = []
     for function in (compare_and_learn, compare_and_learn_twin):

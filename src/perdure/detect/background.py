@@ -65,6 +65,13 @@ class Background:
     least_noise: float = parameter(
         5.0, "noise assumed where less is measured", unit="grey levels", low=0.5, high=100.0
     )
+    darkest_shadow: float = parameter(
+        0.6,
+        "what is darker than the background in its own colour, down to this share of its brightness, is shadow",
+        unit="1 for none",
+        low=0.0,
+        high=1.0,
+    )
     memory: float = parameter(
         30.0, "time over which the background adapts to slow changes", unit="s", low=0.1, high=86400.0
     )
@@ -139,6 +146,7 @@ class Background:
             foreground,
             np.float32(self.threshold**2),
             np.float32(self.least_noise**2),
+            np.float32(self.darkest_shadow),
             np.float32(rate),
             np.float32(foreground_rate),
         )

@@ -19,6 +19,7 @@ def compare_and_learn(
     foreground: NDArray[np.uint8],
     squared_threshold: np.float32,
     least_variance: np.float32,
+    darkest_shadow: np.float32,
     rate: np.float32,
     foreground_rate: np.float32,
 ) -> None:
@@ -38,6 +39,9 @@ def compare_and_learn(
         Every element is written.
     squared_threshold, least_variance : float32
         Foreground where the mean squared difference > squared_threshold * max(variance, least_variance).
+    darkest_shadow : float32
+        In [0, 1]: a pixel as bright as this share of its mean or brighter, but no brighter than it, and
+        of its colour within the same threshold, is shadow: background (Horprasert et al. 1999). 1: no shadows.
     rate, foreground_rate : float32
         In [0, 1]: how far background and foreground pixels move towards what they see.
     """
@@ -51,7 +55,15 @@ def compare_and_learn(
         blue = np.float32(colours[3 * i + 2]) * last - means[3 * i + 2]
         squared = (red * red + green * green + blue * blue) * third
         known = variances[i]
-        moving = squared > squared_threshold * max(known, least_variance)
+        limit = squared_threshold * max(known, least_variance)
+        # Brightness: the multiple of the mean that is nearest; colour: what is left beside it.
+        along = red * means[3 * i] + green * means[3 * i + 1] + blue * means[3 * i + 2]
+        length = (
+            means[3 * i] * means[3 * i] + means[3 * i + 1] * means[3 * i + 1] + means[3 * i + 2] * means[3 * i + 2]
+        )
+        beside = squared - along * along / max(length, np.float32(1.0)) * third
+        shadow = (along <= 0) & (along >= (darkest_shadow - np.float32(1.0)) * length) & (beside <= limit)
+        moving = (squared > limit) & ~shadow
         marks[i] = 255 if moving else 0
         step = foreground_rate if moving else rate
         variances[i] = known + (np.float32(0.0) if moving else rate * (squared - known))
@@ -68,6 +80,7 @@ def compare_and_learn_twin(
     foreground: NDArray[np.uint8],
     squared_threshold: np.float32,
     least_variance: np.float32,
+    darkest_shadow: np.float32,
     rate: np.float32,
     foreground_rate: np.float32,
 ) -> None:
@@ -76,7 +89,13 @@ def compare_and_learn_twin(
     difference = image.astype(np.float32) * exposure - mean  # (H, W, 3)
     red, green, blue = difference[..., 0], difference[..., 1], difference[..., 2]
     squared = (red * red + green * green + blue * blue) * third  # (H, W)
-    moving = squared > squared_threshold * np.maximum(variance, least_variance)
+    limit = squared_threshold * np.maximum(variance, least_variance)
+    along = (difference * mean).astype(np.float32)
+    along = along[..., 0] + along[..., 1] + along[..., 2]  # (H, W)
+    length = mean[..., 0] * mean[..., 0] + mean[..., 1] * mean[..., 1] + mean[..., 2] * mean[..., 2]
+    beside = squared - along * along / np.maximum(length, np.float32(1.0)) * third
+    shadow = (along <= 0) & (along >= (darkest_shadow - np.float32(1.0)) * length) & (beside <= limit)
+    moving = (squared > limit) & ~shadow
     foreground[...] = np.where(moving, 255, 0)
     variance += np.where(moving, np.float32(0.0), rate * (squared - variance))
     mean += np.where(moving, foreground_rate, rate)[..., None] * difference
