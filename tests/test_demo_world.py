@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from perdure.demo import Occluder, Walker, World, demo_world
+from perdure.demo.figures import Clothes
 from perdure.errors import ParameterError
-from perdure.figures import Clothes
 from perdure.types import Status, Tracks
 
 RED, BLUE = Clothes((220, 40, 40)), Clothes((40, 60, 220))

@@ -5,12 +5,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import cv2  # noqa: E402
-from worlds import crossing  # noqa: E402
+import cv2
+from worlds import crossing
 
-from perdure import pipeline  # noqa: E402
-from perdure.cli.track import run  # noqa: E402
-from perdure.files.runs import Reporting, RunFolder  # noqa: E402
+from perdure import pipeline
+from perdure.cli.track import run
+from perdure.files.runs import Reporting, RunFolder
 
 if __name__ == "__main__":
     tracker, folder, threads = sys.argv[1:]

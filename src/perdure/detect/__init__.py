@@ -7,4 +7,6 @@ from typing import Any
 from perdure.detect.background import Background
 from perdure.detect.recorded import Recorded
 
+__all__ = ["DETECTORS", "Background", "Recorded"]
+
 DETECTORS: dict[str, type[Any]] = {"background": Background, "recorded": Recorded}

@@ -6,4 +6,6 @@ from typing import Any
 
 from perdure.trackers.overlap import Overlap
 
+__all__ = ["TRACKERS", "Overlap"]
+
 TRACKERS: dict[str, type[Any]] = {"overlap": Overlap}

@@ -1,0 +1,292 @@
+"""A frame and what is said of it, as a picture: silhouettes, boxes, trails and labels.
+
+How a row looks says how well it is known:
+
+=================  ==========================================================================
+VISIBLE            solid box, filled silhouette, chip in the colour of the id
+PARTLY_OCCLUDED    the same, the edges on the hidden side dashed; the believed outline dotted
+OCCLUDED           dashed and dimmer; a dark chip
+LOST               sparse short dashes, dimmer still; a dark chip
+AMBIGUOUS          dotted, the id with a '?'
+a group            corner brackets around it and its members' ids
+=================  ==========================================================================
+
+Boxes and trails lie on a translucent dark band, so that they read on light and on dark scenes. Widths and
+letters grow with the picture's height. Nothing here opens a file, and the same input gives the same picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.draw.colours import Colour, colour_of, dimmer
+from perdure.draw.labels import Label, Place, lay_labels
+from perdure.draw.trails import Trails, draw_trails
+from perdure.types import Frame, Image, Mask, Scene, Status, Tracks
+
+Lines = list[NDArray[np.int32]]  # each (n, 2): points x, y
+
+_CANVAS: Colour = (30, 33, 40)
+_NAMED_MEMBERS = 6
+
+
+def paint(frame: Frame, rows: Tracks, trails: Trails, scene: Scene, *, masks: bool = True) -> Image:
+    """Return a new picture of the frame with its rows drawn in.
+
+    Parameters
+    ----------
+    frame : Frame
+        Left as it is. Without an image, the rows are drawn on a calm dark canvas of the scene's size.
+    rows : Tracks
+        The rows of this frame.
+    trails : Trails
+        Where the ids have been; `Trails.empty()` for none.
+    scene : Scene
+        Gives the size where the frame has no image.
+    masks : bool
+        Whether silhouettes are drawn too.
+
+    Returns
+    -------
+    (H, W, 3) uint8 RGB array
+    """
+    picture = _canvas(frame, scene)
+    height, width = picture.shape[:2]
+    style = _Style.of(height)
+    seen = rows.take(_inside(rows, height, width))
+    looks = _looks(seen, style)
+    silhouettes = _silhouettes(seen, looks, style, height, width) if masks else []
+    if masks:
+        _fill_masks(picture, seen)
+    if frame.image is None:
+        _fill_boxes(picture, seen)
+    draw_trails(picture, trails, frame.time, style.line, style.halo)
+    boxes = [_box_stroke(box, look, style) for box, look in zip(seen.boxes, looks, strict=True)]
+    _darken_beneath(picture, boxes, style)
+    for stroke in silhouettes:
+        cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width, cv2.LINE_AA)
+    for stroke in boxes:  # upright lines are crisp without anti-aliasing
+        cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width)
+    clock = f"{frame.index}   {frame.time:.2f} s"
+    lay_labels(picture, clock, _labels(seen, looks, style), style.letters)
+    return picture
+
+
+class _Style(NamedTuple):
+    """Widths in pixels for a picture's height."""
+
+    line: int
+    thin: int
+    halo: int  # what the dark band adds to a line's width
+    letters: int  # height of the letters' box
+    dash: float
+
+    @property
+    def gap(self) -> int:
+        """How far a group's brackets stay away from its box."""
+        return 2 * self.line + 2
+
+    @staticmethod
+    def of(height: int) -> _Style:
+        # Two pixels at least where there is room: a film stores colour at half the resolution.
+        line = max(1 if height < 200 else 2, round(height / 320))
+        halo = 2 * max(1, round(height / 900))
+        return _Style(line, max(1, line - 1), halo, max(11, round(height / 38)), 3.0 + 2.5 * line)
+
+
+class _Look(NamedTuple):
+    """How one row is drawn: colour, label, and the dash of each side (left, top, right, bottom)."""
+
+    colour: Colour
+    text: str
+    dashes: tuple[tuple[float, float] | None, ...]  # (drawn, left out) in pixels; None for solid
+    bold: bool  # a chip in full colour and a line of full width
+    group: bool
+
+
+class _Stroke(NamedTuple):
+    """Lines of one colour and width."""
+
+    lines: Lines
+    colour: Colour
+    width: int
+
+
+def _canvas(frame: Frame, scene: Scene) -> Image:
+    if frame.image is not None:
+        return frame.image.copy()
+    return np.full((scene.height, scene.width, 3), _CANVAS, np.uint8)
+
+
+def _inside(rows: Tracks, height: int, width: int) -> NDArray[np.bool_]:
+    x1, y1, x2, y2 = rows.boxes.T
+    return np.asarray((x1 < width) & (y1 < height) & (x2 > 0) & (y2 > 0))
+
+
+def _looks(rows: Tracks, style: _Style) -> list[_Look]:
+    is_group = rows.is_group
+    looks = []
+    for i, identity in enumerate(rows.ids.tolist()):
+        colour = colour_of(identity)
+        status = Status(int(rows.status[i]))
+        text = _group_text(identity, rows.ids[rows.groups == identity].tolist()) if is_group[i] else str(identity)
+        if status == Status.AMBIGUOUS and not is_group[i]:
+            text += "?"
+        dim = status in (Status.OCCLUDED, Status.LOST)
+        dashes = _dashes(status, str(rows.hidden_side[i]), style)
+        looks.append(_Look(dimmer(colour) if dim else colour, text, dashes, not dim, bool(is_group[i])))
+    return looks
+
+
+def _group_text(identity: int, members: Sequence[int]) -> str:
+    named = " ".join(str(member) for member in sorted(members)[:_NAMED_MEMBERS])
+    more = len(members) - _NAMED_MEMBERS
+    return f"group {identity}: {named}" + (f" +{more}" if more > 0 else "")
+
+
+def _dashes(status: Status, hidden_side: str, style: _Style) -> tuple[tuple[float, float] | None, ...]:
+    dash = style.dash
+    if status == Status.PARTLY_OCCLUDED:
+        hidden = hidden_side.split("+")
+        return tuple((dash, dash) if side in hidden else None for side in ("left", "top", "right", "bottom"))
+    pattern = {
+        Status.VISIBLE: None,
+        Status.OCCLUDED: (1.3 * dash, 0.9 * dash),
+        Status.LOST: (0.7 * dash, 1.3 * dash),
+        Status.AMBIGUOUS: (2.0, 1.0 + 3.0 * style.line),
+    }[status]
+    return (pattern,) * 4
+
+
+# Silhouettes ------------------------------------------------------------------------------------------------
+
+
+def _fill_masks(picture: Image, rows: Tracks) -> None:
+    """Tint the pixels seen: three quarters of the picture, one of the colour."""
+    height, width = picture.shape[:2]
+    for identity, mask in zip(rows.ids.tolist(), rows.masks, strict=True):
+        x1, y1, x2, y2 = mask.box
+        left, top, right, bottom = max(x1, 0), max(y1, 0), min(x2, width), min(y2, height)
+        if left < right and top < bottom:
+            bits = mask.bits[top - y1 : bottom - y1, left - x1 : right - x1].view(np.uint8)
+            _tint(picture[top:bottom, left:right], colour_of(identity), 0.26, bits)
+
+
+def _fill_boxes(picture: Image, rows: Tracks) -> None:
+    """Tint whole boxes where there is no image to see."""
+    height, width = picture.shape[:2]
+    for identity, box, group in zip(rows.ids.tolist(), rows.boxes, rows.is_group, strict=True):
+        left, top = max(round(float(box[0])), 0), max(round(float(box[1])), 0)
+        right, bottom = min(round(float(box[2])), width), min(round(float(box[3])), height)
+        if left < right and top < bottom and not group:
+            _tint(picture[top:bottom, left:right], colour_of(identity), 0.18)
+
+
+def _tint(crop: Image, colour: Colour, share: float, bits: NDArray[np.uint8] | None = None) -> None:
+    flat = np.empty_like(crop)
+    flat[:] = colour
+    mixed = cv2.addWeighted(crop, 1.0 - share, flat, share, 0.0)
+    if bits is None:
+        crop[:] = mixed
+    else:
+        cv2.copyTo(mixed, bits, crop)
+
+
+def _silhouettes(rows: Tracks, looks: Sequence[_Look], style: _Style, height: int, width: int) -> list[_Stroke]:
+    """Outlines of what is seen, and dotted ones of what is believed where part of it is hidden."""
+    strokes = []
+    for i, look in enumerate(looks):
+        seen = _outlines(rows.masks[i], height, width)
+        if seen:
+            strokes.append(_Stroke(seen, look.colour, style.thin))
+        whole = rows.believed[i]
+        if whole is not None and rows.status[i] in (Status.PARTLY_OCCLUDED, Status.OCCLUDED):
+            dots = [
+                part for line in _outlines(whole, height, width) for part in _broken(line, 2.0, style.dash / 2)
+            ]
+            strokes.append(_Stroke(dots, dimmer(look.colour), style.thin))
+    return strokes
+
+
+def _outlines(mask: Mask, height: int, width: int) -> Lines:
+    """Closed lines around a mask's parts and holes; what lies far outside the picture is left out."""
+    if not mask.bits.size or mask.x >= width or mask.y >= height:
+        return []
+    contours, _ = cv2.findContours(mask.bits.view(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_TC89_L1)
+    corner = np.array([mask.x, mask.y], np.int32)
+    closed = [np.concatenate([contour, contour[:1]]) for contour in contours if len(contour) > 2]
+    return [np.asarray(line[:, 0] + corner, np.int32) for line in closed]
+
+
+# Boxes ------------------------------------------------------------------------------------------------------
+
+
+def _box_stroke(box: NDArray[np.float32], look: _Look, style: _Style) -> _Stroke:
+    x1, y1, x2, y2 = _whole(box)
+    x2, y2 = max(x2 - 1, x1), max(y2 - 1, y1)  # half-open: the last pixel inside
+    if look.group:
+        return _Stroke(_brackets(x1, y1, x2, y2, style), look.colour, style.line)
+    if not any(look.dashes):
+        ring = np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]], np.int32)
+        return _Stroke([ring], look.colour, style.line)
+    sides = ([[x1, y1], [x1, y2]], [[x1, y1], [x2, y1]], [[x2, y1], [x2, y2]], [[x1, y2], [x2, y2]])
+    lines: Lines = []
+    for side, dashes in zip(sides, look.dashes, strict=True):
+        line = np.array(side, np.int32)
+        lines.extend([line] if dashes is None else _broken(line, *dashes))
+    return _Stroke(lines, look.colour, style.line if look.bold else style.thin)
+
+
+def _whole(box: NDArray[np.float32]) -> Place:
+    """Whole pixels; far corners are brought near, because cv2 counts lines in 16 bits."""
+    x1, y1, x2, y2 = (round(value) for value in np.clip(box, -16000, 16000).tolist())
+    return x1, y1, x2, y2
+
+
+def _brackets(x1: int, y1: int, x2: int, y2: int, style: _Style) -> Lines:
+    x1, y1, x2, y2 = x1 - style.gap, y1 - style.gap, x2 + style.gap, y2 + style.gap
+    arm = max(3, min(x2 - x1, y2 - y1) // 4)
+    corners = ((x1, y1, 1, 1), (x2, y1, -1, 1), (x2, y2, -1, -1), (x1, y2, 1, -1))
+    return [
+        np.array([[x + arm * right, y], [x, y], [x, y + arm * down]], np.int32) for x, y, right, down in corners
+    ]
+
+
+def _broken(line: NDArray[np.int32], drawn: float, left_out: float) -> Lines:
+    """Cut a line (n, 2) into dashes, counted from its first point."""
+    steps = np.hypot(*np.diff(line, axis=0).T.astype(np.float64))
+    along = np.concatenate([[0.0], np.cumsum(steps)])  # (n,)
+    begin = np.arange(0.0, max(along[-1], 1.0), drawn + left_out)
+    ends = np.stack([begin, np.minimum(begin + drawn - 1.0, along[-1])], axis=1)  # (dashes, 2)
+    x, y = (np.interp(ends, along, line[:, axis]) for axis in (0, 1))
+    return list(np.rint(np.stack([x, y], axis=2)).astype(np.int32))  # each (2, 2)
+
+
+# The dark band ----------------------------------------------------------------------------------------------
+
+
+def _darken_beneath(picture: Image, strokes: Sequence[_Stroke], style: _Style) -> None:
+    """Lay the dark band under all lines at once."""
+    band = np.zeros(picture.shape[:2], np.uint8)
+    for stroke in strokes:
+        cv2.polylines(band, stroke.lines, False, 255, stroke.width + style.halo)
+    cv2.copyTo(cv2.convertScaleAbs(picture, alpha=0.42), band, picture)
+
+
+# Labels -----------------------------------------------------------------------------------------------------
+
+
+def _labels(rows: Tracks, looks: Sequence[_Look], style: _Style) -> list[Label]:
+    """The labels, the surest and nearest first: they choose their places first."""
+    order = sorted(range(len(rows)), key=lambda i: (looks[i].bold, float(rows.boxes[i][3])), reverse=True)
+    return [
+        Label(
+            look.text, look.colour, look.bold, _whole(rows.boxes[i]), style.gap if look.group else style.line // 2
+        )
+        for i, look in ((i, looks[i]) for i in order)
+    ]
