@@ -100,9 +100,13 @@ def settle_by_frame(read: Callable[[], Iterable[Report]]) -> Iterator[tuple[int,
     `read` is called twice: once for the corrections and the rows said late, once for the rows. Only those
     are held in memory, so that a log of any length can be settled.
     """
-    corrections = Corrections.of(read())
+    return settle_with(Corrections.of(read()), read())
+
+
+def settle_with(corrections: Corrections, reports: Iterable[Report]) -> Iterator[tuple[int, Tracks]]:
+    """Yield (frame, settled rows) of the reports whose corrections these are."""
     late = deque(sorted(corrections.late.items()))
-    for number, rows in _punctual(read()):
+    for number, rows in _punctual(reports):
         frame = int(rows.frames[0])
         while late and late[0][0] < frame:
             yield from corrections.settled(*late.popleft())
@@ -120,7 +124,7 @@ class Corrections:
     """
 
     by_id: dict[int, list[tuple[int, Renamed | Dropped]]]
-    late: dict[int, list[tuple[int, Tracks]]]  # frame -> (number of the report, rows)
+    late: dict[int, list[tuple[int, Tracks]]]  # frame -> (number of the report, its late rows of any frame)
 
     @staticmethod
     def of(reports: Iterable[Report]) -> Corrections:
@@ -135,7 +139,7 @@ class Corrections:
                 by_id.setdefault(dropped.id, []).append((number, dropped))
             newest, _, behind = _split_late(report.rows, newest)
             for frame in np.unique(behind.frames):
-                late.setdefault(int(frame), []).append((number, behind.in_frame(frame)))
+                late.setdefault(int(frame), []).append((number, behind))
         return Corrections(by_id, late)
 
     def identity(self, said: int, frame: int, number: int) -> int:
@@ -161,6 +165,7 @@ class Corrections:
         """Yield (frame, rows), one per id: of two, the one seen before the one inferred, then the surer, then the later."""
         parts = []
         for number, part in said:
+            part = part if (part.frames == frame).all() else part.in_frame(frame)
             if self.by_id:
                 ids = [self.identity(int(one), frame, number) for one in part.ids]
                 groups = [self.identity(int(one), frame, number) if one else 0 for one in part.groups]

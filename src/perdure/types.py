@@ -316,7 +316,7 @@ class Tracks:
     @staticmethod
     def empty() -> Tracks:
         """Return tracks without a row."""
-        return Tracks.of(frames=[], times=[], ids=[], boxes=np.zeros((0, 4), np.float32))
+        return _NO_TRACKS
 
     @staticmethod
     def join(parts: Iterable[Tracks]) -> Tracks:
@@ -338,6 +338,8 @@ class Tracks:
     def take(self, rows: ArrayLike) -> Tracks:
         """Return the named rows (indices or a bool array), in that order."""
         index = _row_index(rows, len(self))
+        if np.array_equal(index, np.arange(len(self))):
+            return self  # all of them, as they are
         columns: dict[str, Any] = {}
         for name in TRACK_COLUMNS:
             values = getattr(self, name)
@@ -569,3 +571,6 @@ def _chain(pieces: Sequence[Any]) -> Any:
     if isinstance(pieces[0], tuple):
         return tuple(value for piece in pieces for value in piece)
     return np.concatenate(pieces)
+
+
+_NO_TRACKS = Tracks.of(frames=[], times=[], ids=[], boxes=np.zeros((0, 4), np.float32))

@@ -13,7 +13,7 @@ import numpy as np
 from perdure.errors import FormatError
 from perdure.files.lines import mask_of_json, mask_to_json, read_lines, short, short_row, to_line
 from perdure.files.whole import cannot_write
-from perdure.types import Dropped, Event, Explanation, Ground, Renamed, Report, Status, Tracks
+from perdure.types import Dropped, Event, Explanation, Ground, Mask, Renamed, Report, Status, Tracks
 
 FORMAT, VERSION = "perdure-log", 1
 Json = Any
@@ -54,8 +54,8 @@ class RunLog:
         self._file.close()
 
 
-def read_log(path: Path) -> Iterator[Entry]:
-    """Yield the entries of a log, in order.
+def read_log(path: Path, *, with_masks: bool = True) -> Iterator[Entry]:
+    """Yield the entries of a log, in order; without silhouettes, which is faster, where nobody needs them.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def read_log(path: Path) -> Iterator[Entry]:
     """
     for number, _, value in read_lines(path, FORMAT, VERSION):
         try:
-            entry = Entry(int(value["frame"]), float(value["time"]), report_of_json(value))
+            entry = Entry(int(value["frame"]), float(value["time"]), report_of_json(value, with_masks))
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise FormatError(f"{path}, line {number}: not a report ({error!r})") from error
         yield entry
@@ -87,11 +87,11 @@ def report_to_json(frame: int, time: float, report: Report) -> Json:
     return value
 
 
-def report_of_json(value: Mapping[str, Json]) -> Report:
+def report_of_json(value: Mapping[str, Json], with_masks: bool = True) -> Report:
     """Return the report that `report_to_json` wrote."""
     frame, time = int(value["frame"]), float(value["time"])
     return Report(
-        rows=_rows_of_json(value["rows"], frame, time),
+        rows=_rows_of_json(value["rows"], frame, time, with_masks),
         renamed=tuple(Renamed(*map(int, one)) for one in value.get("renamed", ())),
         dropped=tuple(Dropped(*map(int, one)) for one in value.get("dropped", ())),
         events=tuple(Event(**{**one, "ids": tuple(map(int, one["ids"]))}) for one in value.get("events", ())),
@@ -119,7 +119,7 @@ def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:
     return row | {key: value for key, value in optional.items() if value}
 
 
-def _rows_of_json(rows: list[Json], frame: int, time: float) -> Tracks:
+def _rows_of_json(rows: list[Json], frame: int, time: float, with_masks: bool) -> Tracks:
     if not rows:
         return Tracks.empty()
     return Tracks.of(
@@ -135,9 +135,9 @@ def _rows_of_json(rows: list[Json], frame: int, time: float) -> Tracks:
         hidden_side=[row.get("hidden_side", "") for row in rows],
         links=[tuple(map(int, row.get("links", ()))) for row in rows],
         ground=[Ground(*map(float, row["ground"])) if "ground" in row else None for row in rows],
-        believed=[mask_of_json(row["believed"]) if "believed" in row else None for row in rows],
-        masks=[mask_of_json(row.get("mask", _NO_MASK)) for row in rows],
+        believed=[mask_of_json(row["believed"]) if with_masks and "believed" in row else None for row in rows],
+        masks=[mask_of_json(row["mask"]) if with_masks and "mask" in row else _NO_MASK for row in rows],
     )
 
 
-_NO_MASK = {"x": 0, "y": 0, "size": [0, 0], "runs": []}
+_NO_MASK = Mask.empty()

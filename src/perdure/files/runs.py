@@ -6,19 +6,19 @@ import csv
 import json
 from array import array
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from perdure import __version__
 from perdure.errors import FormatError, OutputError
-from perdure.files.log import read_log
+from perdure.files.log import Entry, read_log
 from perdure.files.mot import write_rows
 from perdure.files.whole import cannot_write, whole_file
-from perdure.fold import Corrections, settle, settle_by_frame
+from perdure.fold import Corrections, settle, settle_by_frame, settle_with
 from perdure.params import parameter
-from perdure.types import Event, Tracks
+from perdure.types import Event, Report, Tracks
 
 FORMAT, VERSION = "perdure-run", 1
 EVENT_COLUMNS = (
@@ -132,30 +132,37 @@ class RunFolder:
 
     def write_results(self, reporting: Reporting) -> Totals:
         """Settle the log into `tracks.txt` and `events.csv`, streaming."""
+        corrections = Corrections.of(entry.report for entry in read_log(self.log, with_masks=False))
         rows, ids = 0, set()
-        with whole_file(self.path / "tracks.txt") as file:
-            for _, settled in self.settled_by_frame():
+        with whole_file(self.path / "events.csv") as events, whole_file(self.path / "tracks.txt") as tracks:
+            table = _EventTable(events, corrections)
+            for _, settled in settle_with(corrections, table.passing(read_log(self.log, with_masks=False))):
                 counted = settled.counted(reporting.report_confidence)
-                write_rows(file, counted)
+                write_rows(tracks, counted)
                 rows += len(counted)
                 ids.update(counted.ids.tolist())
-        return Totals(rows, len(ids), self._write_events())
+        return Totals(rows, len(ids), table.count)
 
-    def _write_events(self) -> int:
-        corrections = Corrections.of(entry.report for entry in read_log(self.log))
-        clock = _Clock()
-        count = 0
-        with whole_file(self.path / "events.csv") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(EVENT_COLUMNS)
-            for number, entry in enumerate(read_log(self.log)):
-                clock.note(entry.frame, entry.time)
-                for event in entry.report.events:
-                    settled = corrections.event(event, number)
-                    if settled.ids or not event.ids:
-                        table.writerow(_event_row(settled, clock))
-                        count += 1
-        return count
+
+class _EventTable:
+    """`events.csv`, written while the entries of a log pass by."""
+
+    def __init__(self, file: IO[str], corrections: Corrections) -> None:
+        self.count = 0
+        self._corrections = corrections
+        self._clock = _Clock()
+        self._table = csv.writer(file, lineterminator="\n")
+        self._table.writerow(EVENT_COLUMNS)
+
+    def passing(self, entries: Iterable[Entry]) -> Iterator[Report]:
+        for number, entry in enumerate(entries):
+            self._clock.note(entry.frame, entry.time)
+            for event in entry.report.events:
+                settled = self._corrections.event(event, number)
+                if settled.ids or not event.ids:
+                    self._table.writerow(_event_row(settled, self._clock))
+                    self.count += 1
+            yield entry.report
 
 
 class _Clock:
