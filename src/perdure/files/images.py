@@ -1,0 +1,243 @@
+"""Folders and globs of images, and MOTChallenge folders with or without their images.
+
+Images come in the order of the numbers in their names. Grey ones become RGB, transparency is dropped, and
+16-bit values are divided by one power of two for the whole folder, found from a sample of its images.
+A JPEG or PNG that ends early is refused, a PNG with any changed byte also; a JPEG with changed bytes
+decodes to a changed picture, which nothing tells.
+"""
+
+from __future__ import annotations
+
+import configparser
+import glob
+import os
+import re
+import zlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.errors import FormatError, VideoError
+from perdure.files.numbered import Numbered
+from perdure.files.span import Span
+from perdure.types import Image
+
+SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".jp2"})
+_FILMS = frozenset({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv"})
+_Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+_RATE = 25.0
+_NO_RATE = "images say no frame rate: 25 per second are taken; give fps for the true one"
+
+
+def open_folder(folder: Path, fps: float | None, span: Span) -> Numbered:
+    """Open a folder of images, or a MOTChallenge folder."""
+    if (folder / "seqinfo.ini").is_file():
+        return _open_sequence(folder, fps, span)
+    paths, warnings = _images_in(folder)
+    if not paths:
+        raise VideoError(_nothing_in(folder))
+    richer = [one.name for one in _folders_of_images(folder) if len(_images_in(one)[0]) > len(paths)]
+    if richer:
+        warnings.append(f"there are more images in its folder {' and '.join(richer[:3])} than in {folder} itself")
+    return _open_images(paths, folder.resolve().name, str(folder.resolve()), fps, span, warnings)
+
+
+def open_glob(pattern: str, fps: float | None, span: Span) -> Numbered:
+    """Open the images that a pattern such as 'frames/*.png' matches."""
+    paths = sorted((Path(one) for one in glob.glob(pattern, recursive=True)), key=natural_order)
+    paths = [one for one in paths if one.is_file()]
+    if not paths:
+        raise VideoError(f"nothing matches {pattern}")
+    name = paths[0].resolve().parent.name
+    return _open_images(paths, name, str(Path(pattern).absolute()), fps, span, [])
+
+
+def open_single(path: Path, fps: float | None, span: Span) -> Numbered:
+    """Open one image as a source of one frame."""
+    return _open_images([path], path.stem, str(path.resolve()), fps, span, [])
+
+
+def natural_order(path: Path) -> tuple[object, ...]:
+    """Return what sorts img2 before img10.
+
+    >>> sorted([Path("img10.png"), Path("img2.png")], key=natural_order)[0].name
+    'img2.png'
+    """
+    parts = re.split(r"(\d+)", path.name)
+    words, numbers = parts[::2], [int(one) for one in parts[1::2]]
+    return (*(one for pair in zip(words, [*numbers, -1], strict=True) for one in pair), str(path))
+
+
+def read_pixels(path: Path) -> _Pixels:
+    """Read an image file as (H, W, 3) RGB of 8 or 16 bits; VideoError for one that cannot be read."""
+    import cv2
+
+    try:
+        encoded = path.read_bytes()
+    except OSError as error:
+        raise VideoError(f"{path} cannot be read ({error.strerror})") from None
+    if not encoded:
+        raise VideoError(f"{path} is empty (0 bytes)")
+    if not _is_whole(encoded):
+        raise VideoError(f"{path} is damaged or ends early")
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
+    try:
+        pixels = cv2.imdecode(np.frombuffer(encoded, np.uint8), flags)
+    except cv2.error:
+        pixels = None
+    if pixels is None:
+        raise VideoError(f"{path} is not an image that can be read")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise VideoError(f"{path} has {pixels.dtype} pixels; 8 or 16 bits can be read")
+    return cast("_Pixels", cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB))  # (H, W, 3)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads the images of a folder as 8-bit RGB, 16-bit values divided by 2 ** shift."""
+
+    paths: Sequence[Path]
+    shift: int = 0
+
+    def __call__(self, index: int) -> Image:
+        pixels = read_pixels(self.paths[index])
+        shifted = pixels >> self.shift if pixels.dtype == np.uint16 else pixels
+        return np.minimum(shifted, 255).astype(np.uint8, copy=False)
+
+
+def _open_images(
+    paths: Sequence[Path], name: str, origin: str, fps: float | None, span: Span, warnings: list[str]
+) -> Numbered:
+    first = read_pixels(paths[0])
+    height, width = first.shape[:2]
+    reader = _Reader(paths, _shift_of(paths, warnings) if first.dtype == np.uint16 else 0)
+    return Numbered(
+        name,
+        origin,
+        width,
+        height,
+        fps or _RATE,
+        len(paths),
+        span,
+        reader,
+        names=tuple(one.name for one in paths),
+        warnings=(*warnings, *([] if fps else [_NO_RATE])),
+    )
+
+
+def _open_sequence(folder: Path, fps: float | None, span: Span) -> Numbered:
+    """Open a MOTChallenge folder."""
+    told = _read_seqinfo(folder / "seqinfo.ini")
+    place = folder / told.images
+    paths, warnings = _images_in(place) if place.is_dir() else ([], [])
+    name, origin, rate = folder.resolve().name, str(folder.resolve()), fps or told.rate
+    if not paths:
+        return Numbered(
+            name, origin, told.width, told.height, rate, told.length, span, _no_image, False, folder=folder
+        )
+    if len(paths) != told.length:
+        warnings.append(f"seqinfo.ini says {told.length} frames, {place.name} holds {len(paths)} images")
+    return replace(_open_images(paths, name, origin, rate, span, warnings), folder=folder)
+
+
+def _no_image(_: int) -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a seqinfo.ini says."""
+
+    images: str
+    rate: float
+    length: int
+    width: int
+    height: int
+
+
+def _read_seqinfo(path: Path) -> _Told:
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read_string(path.read_text(encoding="utf-8-sig"), str(path))
+        told = parser["Sequence"]
+        result = _Told(
+            told.get("imDir", "img1"),
+            float(told["frameRate"]),
+            int(told["seqLength"]),
+            int(told["imWidth"]),
+            int(told["imHeight"]),
+        )
+    except KeyError as error:
+        raise FormatError(f"{path}: {error.args[0]!r} is missing") from None
+    except (configparser.Error, ValueError) as error:
+        raise FormatError(f"{path}: {' '.join(str(error).split())}") from None
+    if not 0 < result.rate < float("inf") or min(result.length, result.width, result.height) < 0:
+        raise FormatError(f"{path}: frameRate must be > 0, seqLength, imWidth and imHeight not below 0")
+    return result
+
+
+def _images_in(folder: Path) -> tuple[list[Path], list[str]]:
+    """The images of a folder in their order: those of the commonest suffix, with a warning of others."""
+    paths = [
+        one
+        for one in sorted(folder.iterdir(), key=natural_order)
+        if one.suffix.lower() in SUFFIXES and not one.name.startswith(".") and one.is_file()
+    ]
+    counts = Counter(one.suffix.lower() for one in paths).most_common()
+    if len(counts) < 2:
+        return paths, []
+    chosen = [one for one in paths if one.suffix.lower() == counts[0][0]]
+    others = ", ".join(f"{count} {suffix}" for suffix, count in counts[1:])
+    return chosen, [f"only the {len(chosen)} {counts[0][0]} images are read, not the others ({others})"]
+
+
+def _nothing_in(folder: Path) -> str:
+    """Say that a folder holds no images, with what it holds instead."""
+    inside = sorted(folder.iterdir(), key=natural_order)
+    films = [one.name for one in inside if one.suffix.lower() in _FILMS]
+    if films:
+        return f"{folder} holds no images; did you mean the video in it: {', '.join(films[:5])}?"
+    below = [one.name for one in _folders_of_images(folder)]
+    if below:
+        return f"{folder} holds no images itself; did you mean its folder {' or '.join(below[:5])}?"
+    return f"{folder} holds no images ({', '.join(sorted(SUFFIXES))})"
+
+
+def _folders_of_images(folder: Path) -> list[Path]:
+    inside = sorted(folder.iterdir(), key=natural_order)
+    return [one for one in inside if one.is_dir() and os.access(one, os.R_OK | os.X_OK) and _images_in(one)[0]]
+
+
+def _shift_of(paths: Sequence[Path], warnings: list[str]) -> int:
+    """By how many bits 16-bit values are shifted, so that the largest of nine images fits 8 bits."""
+    places = np.unique(np.linspace(0, len(paths) - 1, 9).astype(int))
+    largest = 0
+    for place in places:
+        try:
+            largest = max(largest, int(read_pixels(paths[place]).max()))
+        except VideoError:
+            continue  # said when its turn comes
+    shift = max(0, largest.bit_length() - 8)
+    warnings.append(f"16-bit images: their values are divided by {1 << shift}")
+    return shift
+
+
+def _is_whole(encoded: bytes) -> bool:
+    """Whether an encoded JPEG has its end, and a PNG all its checksums; others are left to the decoder."""
+    if encoded.startswith(b"\xff\xd8"):
+        return encoded.rfind(b"\xff\xd9") > encoded.rfind(b"\xff\xda") > 0
+    if not encoded.startswith(b"\x89PNG\r\n\x1a\n"):
+        return True
+    at, kind = 8, b""
+    while kind != b"IEND":
+        length, kind = int.from_bytes(encoded[at : at + 4]), encoded[at + 4 : at + 8]
+        end = at + 8 + length
+        if end + 4 > len(encoded) or zlib.crc32(encoded[at + 4 : end]) != int.from_bytes(encoded[end : end + 4]):
+            return False
+        at = end + 4
+    return True

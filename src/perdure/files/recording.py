@@ -1,0 +1,249 @@
+"""A video file as a source: true timestamps, exact frame numbers, everything before the first damage."""
+
+from __future__ import annotations
+
+import contextlib
+import weakref
+from bisect import bisect_left
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import av
+import numpy as np
+from av.video.stream import VideoStream
+
+from perdure.errors import DamagedVideo, ParameterError, VideoError
+from perdure.files.ahead import ahead
+from perdure.files.clock import Clock
+from perdure.files.decoding import Broken, Listing, Picture, can_enter, decode, list_frames, rgb
+from perdure.files.refusal import opened, video_stream
+from perdure.files.span import Span
+from perdure.types import Bits, Frame, Image, Scene
+
+_RATE = 25.0  # frames per second, where a file says none
+_SHORT = 1500 * 768 * 576  # pixels: a recording up to this is decoded straight through for a first look
+_FURTHER = 48  # frames decoded after a key frame, at most, for a first look
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A video file as a source."""
+
+    name: str
+    origin: str
+    width: int
+    height: int
+    fps: float
+    span: Span
+    path: Path
+    fixed: float | None
+    first: float | None
+    turns: int
+    total: int | None
+    count: int | None
+    listing: Listing | None
+    warnings: list[str] = field(default_factory=list)
+    rereadable: bool = True
+    has_images: bool = True
+    folder: Path | None = None
+    running: weakref.WeakSet[Generator[Frame, None, None]] = field(default_factory=weakref.WeakSet, repr=False)
+
+    def __iter__(self) -> Iterator[Frame]:
+        frames = ahead(self._frames())
+        self.running.add(frames)
+        return frames
+
+    def sample(self, count: int) -> list[Frame]:
+        """Return about `count` frames spread over the wanted part; damaged ones are left out.
+
+        A short recording is decoded straight through; of a long one the key frames near evenly spaced
+        times are taken, and frames a little after them.
+        """
+        if count < 1:
+            return []
+        known = self.listing or list_frames(self.path)
+        wanted = wanted_frames(self.span, known, self.fixed, self.first)
+        if not wanted:
+            return []
+        places = {wanted[i] for i in np.linspace(0, len(wanted) - 1, min(count, len(wanted))).round().astype(int)}
+        straight = max(places) * self.width * self.height <= _SHORT or not known.keys
+        found = self._pick(sorted(places)) if straight else self._leap(sorted(places), known)
+        return [frame for _, frame in sorted(found.items())]
+
+    def image_name(self, index: int) -> str | None:
+        """Return None: no frame of it is a file of its own."""
+        return None
+
+    def scene(self, roi: Bits | None = None) -> Scene:
+        """Return the scene that this source shows."""
+        return Scene(self.width, self.height, self.fps, roi=roi)
+
+    def close(self) -> None:
+        """End what still reads from it."""
+        for frames in list(self.running):
+            frames.close()
+
+    def _frames(self) -> Generator[Frame, None, None]:
+        """The wanted frames; DamagedVideo at the first damage, after every frame before it."""
+        clock = self._clock()
+        begin: int | None = None
+        upcoming = 0
+        try:
+            for picture in decode(self.path, key=self._key(), listing=self.listing):
+                time = clock.time(picture.index, picture.seconds)
+                upcoming = picture.index + 1
+                if self.span.passed(picture.index, time):
+                    return
+                if not self.span.reached(picture.index, time):
+                    continue
+                begin = picture.index if begin is None else begin
+                if (picture.index - begin) % self.span.stride == 0:
+                    yield Frame(picture.index, time, self._image(picture, time))
+        except Broken:
+            raise self._damaged(upcoming, clock.next_time) from None
+        if begin is None and self.span.start is not None:
+            raise VideoError(too_late(self.span, self.path, clock.last or 0.0))
+
+    def _damaged(self, index: int, time: float) -> DamagedVideo:
+        of = f" of {self.total}" if self.total and self.total > index else ""
+        return DamagedVideo(
+            f"{self.path.name} is damaged: it breaks off at frame {index} ({time:.2f} s){of};"
+            " everything before it is kept",
+            index,
+            time,
+        )
+
+    def _image(self, picture: Picture, time: float) -> Image:
+        image = rgb(picture.frame)
+        if self.turns:
+            image = np.ascontiguousarray(np.rot90(image, self.turns))
+        if image.shape[:2] != (self.height, self.width):
+            size = f"{image.shape[1]}x{image.shape[0]}"
+            raise DamagedVideo(
+                f"{self.path.name} changes its size from {self.width}x{self.height} to {size} at frame"
+                f" {picture.index} ({time:.2f} s); everything before it is kept",
+                picture.index,
+                time,
+            )
+        return image
+
+    def _clock(self) -> Clock:
+        return Clock(self.fps, self.warnings, self.first, self.fixed)
+
+    def _key(self) -> int | None:
+        """The key frame to enter at for the start, where the file's packets tell which frame it is."""
+        if self.listing is None or not self.listing.exact:
+            return None
+        wanted = wanted_frames(self.span, self.listing, self.fixed, self.first)
+        key = self.listing.key_before(wanted.start) if wanted else self.listing.stamps[0]
+        return key if key > self.listing.stamps[0] and can_enter(self.path, key) else None
+
+    def _pick(self, places: list[int], key: int | None = None, known: Listing | None = None) -> dict[int, Frame]:
+        """Decode straight on to the last place and keep the frames at the places."""
+        clock = self._clock()
+        found: dict[int, Frame] = {}
+        pictures = decode(self.path, key=key, listing=known)
+        with contextlib.suppress(Broken, VideoError), contextlib.closing(pictures):
+            for picture in pictures:
+                time = clock.time(picture.index, picture.seconds)
+                if picture.index in places or (key is not None and picture.index > places[-1] and not found):
+                    found[picture.index] = Frame(picture.index, time, self._image(picture, time))
+                if picture.index >= places[-1]:
+                    break
+        return found
+
+    def _leap(self, places: list[int], known: Listing) -> dict[int, Frame]:
+        """Enter at the key frame before each place and go on towards it, `_FURTHER` frames a place at most."""
+        found: dict[int, Frame] = {}
+        near: dict[int, list[int]] = {}
+        for place in places:
+            near.setdefault(known.key_before(place), []).append(place)
+        for key, wanted in near.items():
+            base = bisect_left(known.stamps, key)
+            close = [min(place, base + _FURTHER * (i + 1)) for i, place in enumerate(wanted)]
+            found |= self._pick(close, key, known)
+        return found
+
+
+def wanted_frames(span: Span, known: Listing, fixed: float | None, first: float | None) -> range:
+    """Return the numbers of the wanted frames, by the timestamps of the packets or by a fixed rate."""
+    if fixed:
+        return span.numbers(len(known.stamps), fixed)
+    times = [stamp * known.tick - (first or 0.0) for stamp in known.stamps]
+    begin = next((i for i, time in enumerate(times) if span.reached(i, time)), len(times))
+    stop = next((i for i, time in enumerate(times) if span.passed(i, time)), len(times))
+    return range(begin, max(begin, stop), span.stride)
+
+
+def too_late(span: Span, path: Path, length: float) -> str:
+    """Say that the start lies beyond the end."""
+    return f"start ({span.start}) is beyond the end of {path.name}: it is {length:.2f} s long"
+
+
+def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
+    """Open a video file and decode its first frame.
+
+    Raises
+    ------
+    VideoError
+        For a file that holds no video, that cannot be decoded, or that ends before the start.
+    """
+    warnings: list[str] = []
+    with opened(path) as container:
+        stream = video_stream(path, container)
+        rate = _rate(stream, warnings)
+        length = (container.duration or 0) / av.time_base
+    total = stream.frames or round(length * rate) or None
+    first = first_picture(path)
+    turns = round(first.frame.rotation / 90) % 4
+    if turns:
+        warnings.append(f"rotated by {90 * turns}° counter-clockwise, as its metadata says")
+    width, height = first.frame.width, first.frame.height
+    whole = span.start is None and span.end is None
+    listing = None if whole else list_frames(path)
+    count = None if total is None else -(-total // span.stride)
+    if listing is not None and listing.stamps:
+        wanted = wanted_frames(span, listing, fps, first.seconds)
+        count = len(wanted)
+        if span.start is not None and wanted.start >= len(listing.stamps):
+            own = (listing.stamps[-1] - listing.stamps[0]) * listing.tick + 1 / rate
+            raise VideoError(too_late(span, path, len(listing.stamps) / fps if fps else own))
+        if not wanted:
+            raise ParameterError(f"start ({span.start or 0}) must lie before end ({span.end})")
+    return Recording(
+        name=path.stem,
+        origin=str(path.resolve()),
+        width=height if turns % 2 else width,
+        height=width if turns % 2 else height,
+        fps=fps or rate,
+        span=span,
+        path=path,
+        fixed=fps,
+        first=first.seconds,
+        turns=turns,
+        total=total,
+        count=count,
+        listing=listing,
+        warnings=warnings,
+    )
+
+
+def first_picture(path: Path) -> Picture:
+    """Decode the first picture; VideoError where there is none."""
+    with contextlib.closing(decode(path)) as pictures:
+        try:
+            picture = next(pictures, None)
+        except Broken:
+            raise VideoError(f"{path} is damaged: its first frame cannot be decoded") from None
+    if picture is None:
+        raise VideoError(f"{path} holds no frames")
+    return picture
+
+
+def _rate(stream: VideoStream, warnings: list[str]) -> float:
+    for rate in (stream.average_rate, stream.guessed_rate):
+        if rate and 0 < rate <= 1000:
+            return float(rate)
+    warnings.append(f"it says no frame rate: {_RATE:g} per second are taken; give fps for the true one")
+    return _RATE

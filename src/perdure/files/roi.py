@@ -1,0 +1,175 @@
+"""The part of the picture in which something may be seen: an image, a box, or polygons.
+
+A pixel is inside when its centre is: the polygon '0,0 4,0 4,4 0,4' is the box '0,0,4,4'.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from perdure.errors import FormatError, ParameterError, VideoError
+from perdure.types import Bits
+
+Ring = list[tuple[float, float]]
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_BOX = re.compile(rf"\s*{_NUMBER}(?:\s*,\s*{_NUMBER}){{3}}\s*")
+_POLYGON = re.compile(rf"\s*{_NUMBER},{_NUMBER}(?:\s+{_NUMBER},{_NUMBER}){{2,}}\s*")
+_FORMS = "an image or a file of polygons, a box 'x,y,w,h', or a polygon 'x,y x,y x,y'"
+
+
+def read_roi(text_or_path: str | Path, width: int, height: int) -> Bits:
+    """Read a region of interest.
+
+    Parameters
+    ----------
+    text_or_path : str or Path
+        An image of the scene's size (not black is inside), a box 'x,y,w,h', a polygon 'x,y x,y x,y …',
+        or a file of polygons: GeoJSON in pixels, or one polygon a line.
+    width, height : int
+        The scene's size in pixels.
+
+    Returns
+    -------
+    (height, width) bool array
+        True inside.
+
+    Raises
+    ------
+    ParameterError
+        For a text that is none of these, or a region without a pixel inside the scene.
+    FormatError
+        For a file that is none of these.
+    """
+    text = str(text_or_path)
+    if _BOX.fullmatch(text):
+        inside = _box(text, width, height)
+    elif _POLYGON.fullmatch(text):
+        inside = _filled([[_ring(text)]], width, height)
+    elif Path(text).is_file():
+        inside = _read_file(Path(text), width, height)
+    else:
+        raise ParameterError(f"roi = {text!r} is no file and no region: give {_FORMS}")
+    if not inside.any():
+        raise ParameterError(f"the roi {text!r} has no pixel inside the scene of {width}x{height}")
+    return inside
+
+
+def _box(text: str, width: int, height: int) -> Bits:
+    """The pixels whose centre is in the half-open box."""
+    x, y, w, h = (float(one) for one in text.split(","))
+    columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
+    across, down = (columns >= x) & (columns < x + w), (rows >= y) & (rows < y + h)
+    inside = np.zeros((height, width), np.bool_)
+    inside[np.ix_(down, across)] = True
+    return inside
+
+
+def _read_file(path: Path, width: int, height: int) -> Bits:
+    """An image, GeoJSON, or lines of polygons, whichever the file holds."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        return _read_image(path, width, height)
+    except OSError as error:
+        raise FormatError(f"{path} cannot be read ({error.strerror})") from None
+    if "\0" in text:
+        return _read_image(path, width, height)
+    if text.lstrip().startswith(("{", "[")):
+        return _filled(list(_read_json(path, text)), width, height)
+    return _filled(list(_read_lines(path, text)), width, height)
+
+
+def _read_image(path: Path, width: int, height: int) -> Bits:
+    from perdure.files.images import read_pixels
+
+    try:
+        pixels = read_pixels(path)  # (H, W, 3)
+    except VideoError as error:
+        raise FormatError(f"the roi {error}") from None
+    if pixels.shape[:2] != (height, width):
+        raise FormatError(f"the roi {path} is {pixels.shape[1]}x{pixels.shape[0]}, the scene {width}x{height}")
+    return np.asarray(pixels.any(axis=2), np.bool_)  # (H, W)
+
+
+def _read_lines(path: Path, text: str) -> Iterator[list[Ring]]:
+    found = False
+    for number, line in enumerate(text.splitlines(), 1):
+        bare = line.split("#")[0].strip()
+        if not bare:
+            continue
+        if not _POLYGON.fullmatch(bare):
+            raise FormatError(f"{path}, line {number}: not a polygon 'x,y x,y x,y': {line.strip()[:60]!r}")
+        found = True
+        yield [_ring(bare)]
+    if not found:
+        raise FormatError(f"the roi {path} holds no polygon")
+
+
+def _read_json(path: Path, text: str) -> Iterator[list[Ring]]:
+    try:
+        written = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise FormatError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
+    try:
+        polygons = [[_points(ring) for ring in polygon] for polygon in _polygons(written)]
+    except (KeyError, TypeError, ValueError, RecursionError):
+        raise FormatError(
+            f"{path} is not GeoJSON of Polygon or MultiPolygon: points are [x, y] in pixels, at least three a ring"
+        ) from None
+    if not polygons:
+        raise FormatError(f"the roi {path} holds no polygon")
+    yield from polygons
+
+
+def _polygons(written: Any) -> Iterator[Sequence[Any]]:
+    """The polygons of a GeoJSON object, each a list of rings: the outer one, then holes."""
+    kind = written["type"]
+    if kind == "FeatureCollection":
+        for feature in written["features"]:
+            yield from _polygons(feature)
+    elif kind == "Feature":
+        yield from _polygons(written["geometry"])
+    elif kind == "GeometryCollection":
+        for geometry in written["geometries"]:
+            yield from _polygons(geometry)
+    elif kind == "MultiPolygon":
+        yield from written["coordinates"]
+    elif kind == "Polygon":
+        yield written["coordinates"]
+    else:
+        raise ValueError(kind)
+
+
+def _points(ring: Sequence[Sequence[float]]) -> Ring:
+    points = [(float(point[0]), float(point[1])) for point in ring]
+    if len(points) < 3 or not np.isfinite(points).all():
+        raise ValueError("a ring has at least three points")
+    return points
+
+
+def _ring(text: str) -> Ring:
+    pairs = (one.split(",") for one in text.split())
+    return [(float(x), float(y)) for x, y in pairs]
+
+
+def _filled(polygons: list[list[Ring]], width: int, height: int) -> Bits:
+    """The pixels whose centre is inside any polygon: crossed an odd number of times by a ray to the left."""
+    inside = np.zeros((height, width), np.bool_)
+    columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
+    for polygon in polygons:
+        odd = np.zeros((height, width), np.bool_)
+        for ring in polygon:
+            for (x1, y1), (x2, y2) in zip(ring, [*ring[1:], ring[0]], strict=True):
+                across = np.flatnonzero((rows >= min(y1, y2)) & (rows < max(y1, y2)))
+                if across.size:
+                    x = x1 + (rows[across] - y1) * (x2 - x1) / (y2 - y1)  # where each row meets the edge
+                    odd[across] ^= columns[None] >= x[:, None]
+        inside |= odd
+    return inside

@@ -1,0 +1,192 @@
+"""Opening a source: a video file, a folder or glob of images, a camera, a URL, a MOTChallenge folder, arrays.
+
+What a source says of time is kept: `Frame.time` is the file's own timestamp, also where the frame rate
+varies, and `Frame.index` is the number in the whole source, also after a start or with a stride.
+Every kind of source is a file of its own beside this one; this is the door.
+"""
+
+from __future__ import annotations
+
+import glob
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.errors import ParameterError, VideoError
+from perdure.files.span import Span, read_span
+from perdure.types import Bits, Frame, Scene
+
+
+class Source(Protocol):
+    """Frames from somewhere, one after the other."""
+
+    @property
+    def name(self) -> str:
+        """A short name, fit for a folder."""
+        ...
+
+    @property
+    def origin(self) -> str:
+        """Where it comes from: an absolute path, a URL, a camera."""
+        ...
+
+    @property
+    def width(self) -> int:
+        """Pixels, after the rotation that the file asks for."""
+        ...
+
+    @property
+    def height(self) -> int:
+        """Pixels, after the rotation that the file asks for."""
+        ...
+
+    @property
+    def fps(self) -> float:
+        """Nominal frames per second; times come with the frames."""
+        ...
+
+    @property
+    def count(self) -> int | None:
+        """How many frames it will deliver, as far as it says; None where it does not."""
+        ...
+
+    @property
+    def rereadable(self) -> bool:
+        """Whether iterating twice gives the same frames."""
+        ...
+
+    @property
+    def has_images(self) -> bool:
+        """False for a MOTChallenge folder without images, whose frames have the image None."""
+        ...
+
+    @property
+    def warnings(self) -> list[str] | tuple[str, ...]:
+        """What the user should know; more may be added while it is read."""
+        ...
+
+    @property
+    def folder(self) -> Path | None:
+        """The root of a MOTChallenge folder, else None."""
+        ...
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames; raises DamagedVideo where the source breaks off."""
+        ...
+
+    def sample(self, count: int) -> list[Frame]:
+        """Return about `count` frames spread over the whole, for a first look; [] if not rereadable."""
+        ...
+
+    def image_name(self, index: int) -> str | None:
+        """Return the file name of the image that is frame `index`, or None."""
+        ...
+
+    def scene(self, roi: Bits | None = None) -> Scene:
+        """Return the scene that this source shows."""
+        ...
+
+    def close(self) -> None:
+        """End reading and give back files, threads and devices."""
+        ...
+
+
+def open_source(
+    source: str | Path | int | Iterable[NDArray[np.uint8]],
+    *,
+    fps: float | None = None,
+    start: str | float | None = None,
+    end: str | float | None = None,
+    stride: int = 1,
+) -> Source:
+    """Open a source and look at its first frame.
+
+    Parameters
+    ----------
+    source : str, Path, int or iterable of arrays
+        A video file, a folder or glob of images, a MOTChallenge folder (one with `seqinfo.ini`), a
+        camera's number, a URL, or (H, W, 3) or (H, W) uint8 arrays, RGB or grey.
+    fps : float or None
+        Frames per second, instead of what the source says: times become index / fps.
+    start, end : str, float or None
+        Seconds (12.5, '1:02', '0:01:02.5') or a frame ('300f'); the end is not included.
+    stride : int
+        Every so many frames, from the start.
+
+    Raises
+    ------
+    VideoError
+        For a source that cannot be opened, or holds no frame.
+    ParameterError
+        For an fps, start, end or stride that cannot be.
+    FormatError
+        For a `seqinfo.ini` that is not what it should be.
+    """
+    if fps is not None and not (math.isfinite(fps) and fps > 0):
+        raise ParameterError(f"fps = {fps!r} is out of range: it must be > 0 frames per second")
+    span = read_span(start, end, stride)
+    if isinstance(source, (int, np.integer)):
+        return _open_camera(int(source), fps, span)
+    if isinstance(source, (str, Path)):
+        return _open_place(source, fps, span)
+    if not isinstance(source, Iterable):
+        raise ParameterError(
+            f"source = {source!r} is not a file, folder, URL, camera number or iterable of arrays"
+        )
+    from perdure.files.arrays import open_arrays
+
+    return open_arrays(source, fps, span)
+
+
+def _open_place(source: str | Path, fps: float | None, span: Span) -> Source:
+    text = str(source)
+    if not text:
+        raise ParameterError("the source is empty: give a file, a folder, a URL or a camera number")
+    if "://" in text:
+        from perdure.files.live import open_url
+
+        return open_url(text, fps, span)
+    if text.isascii() and text.isdigit() and not Path(text).exists():
+        return _open_camera(int(text), fps, span)
+    try:
+        return _open_path(text, fps, span)
+    except PermissionError as error:
+        place = error.filename or text
+        raise VideoError(f"{place} cannot be read: permission denied; check its rights") from None
+
+
+def _open_path(text: str, fps: float | None, span: Span) -> Source:
+    from perdure.files import images, recording
+
+    path = Path(text)
+    if path.is_dir():
+        return images.open_folder(path, fps, span)
+    if path.exists():
+        opener = images.open_single if path.suffix.lower() in images.SUFFIXES else recording.open_recording
+        return opener(path, fps, span)
+    if glob.has_magic(text):
+        return images.open_glob(text, fps, span)
+    raise VideoError(_missing(path))
+
+
+def _open_camera(number: int, fps: float | None, span: Span) -> Source:
+    from perdure.files.live import open_camera
+
+    return open_camera(number, fps, span)
+
+
+def _missing(path: Path) -> str:
+    """Say that nothing is at a path, with what comes near it."""
+    import difflib
+
+    folder = path.parent
+    if not folder.is_dir():
+        return f"{path} does not exist: there is no folder {folder}"
+    names = [one.name for one in folder.iterdir() if not one.name.startswith(".")]
+    near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    return f"{path} does not exist{hint}"
