@@ -17,6 +17,7 @@ MOMENTS = (100, 160, 235, 300)  # frames of the demo film
 
 
 def main() -> None:
+    """Track the demo film and lay four of its frames side by side."""
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run(
             [sys.executable, "-c", "from perdure.cli import main; main()", "demo", "-o", folder], check=True
