@@ -66,7 +66,7 @@ class Background:
         5.0, "noise assumed where less is measured", unit="grey levels", low=0.5, high=100.0
     )
     darkest_shadow: float = parameter(
-        0.6,
+        0.8,
         "what is darker than the background in its own colour, down to this share of its brightness, is shadow",
         unit="1 for none",
         low=0.0,
@@ -82,7 +82,7 @@ class Background:
         low=0.1,
         high=86400.0,
     )
-    least_area: float = parameter(0.0003, "smallest region", unit="of the frame's area", low=0.0, high=1.0)
+    least_area: float = parameter(0.0002, "smallest region", unit="of the frame's area", low=0.0, high=1.0)
     closing: float = parameter(
         0.005, "gaps closed within a region", unit="of the frame's height", low=0.0, high=0.1
     )
@@ -146,7 +146,7 @@ class Background:
             foreground,
             np.float32(self.threshold**2),
             np.float32(self.least_noise**2),
-            np.float32(self.darkest_shadow),
+            np.float32(self.darkest_shadow if _has_colour(image) else 1.0),
             np.float32(rate),
             np.float32(foreground_rate),
         )
@@ -191,7 +191,15 @@ _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
 _HEALING = 5.0  # s over which a model that has seen nothing yet takes in what stands still
 _STRIP = 32  # rows
 _GRID = 48  # rows of the grid on which the exposure is measured
+_GREY = 4  # grey levels that the channels of a colourless picture may differ by
 _GAUSSIAN = 1.4826  # standard deviation of a Gaussian / its median absolute deviation
+
+
+def _has_colour(image: Image) -> bool:
+    """Whether a picture has colour at all; in a grey one nothing tells a shadow from a dark thing."""
+    step = max(1, min(image.shape[:2]) // _GRID)
+    seen = image[::step, ::step].astype(np.int16)
+    return bool((np.ptp(seen, axis=2) > _GREY).any())
 
 
 def _smooth(image: Image) -> Image:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,6 +9,7 @@ import cv2
 import numpy as np
 
 from perdure.draw.colours import DARK, LIGHT, Colour, readable_on
+from perdure.features.boxes import intersections
 from perdure.types import Image
 
 Place = tuple[int, int, int, int]  # x1, y1, x2, y2 in whole pixels
@@ -56,17 +56,13 @@ def _lay(picture: Image, x: int, y: int, chip: Image, share: float) -> Place:
 def _free_place(label: Label, chip: Image, taken: Sequence[Place], picture: Image) -> tuple[int, int]:
     """Return the corner of the first place at the box that covers no other label, else the least covering."""
     (tall, wide), (height, width) = chip.shape[:2], picture.shape[:2]
-    best, least = (0, 0), math.inf
-    for rank, (x, y) in enumerate(_places(label, tall, wide)):
-        at = min(max(x, 0), width - wide), min(max(y, 0), height - tall)
-        moved = abs(at[0] - x) + abs(at[1] - y)
-        covered = sum(_shared((*at, at[0] + wide, at[1] + tall), other) for other in taken)
-        cost = 1000.0 * covered + 4.0 * moved + rank
-        if cost < least:
-            best, least = at, cost
-        if least <= rank:  # free, and none of the following can be better
-            break
-    return best
+    wished = np.array(_places(label, tall, wide))  # (P, 2)
+    corners = np.clip(wished, 0, (width - wide, height - tall))  # (P, 2)
+    places = np.concatenate([corners, corners + np.array([wide, tall])], axis=1)  # (P, 4)
+    covered = intersections(places, np.array(taken).reshape(-1, 4)).sum(axis=1)
+    cost = 1000.0 * covered + 4.0 * np.abs(corners - wished).sum(axis=1) + np.arange(len(places))
+    x, y = corners[int(cost.argmin())]
+    return int(x), int(y)
 
 
 def _places(label: Label, tall: int, wide: int) -> list[tuple[int, int]]:
@@ -82,12 +78,6 @@ def _places(label: Label, tall: int, wide: int) -> list[tuple[int, int]]:
         (x2 + gap + 1, y1),
         (x1 - gap - wide - 1, y1),
     ]
-
-
-def _shared(one: Place, other: Place) -> int:
-    across = min(one[2], other[2]) - max(one[0], other[0])
-    down = min(one[3], other[3]) - max(one[1], other[1])
-    return max(across, 0) * max(down, 0)
 
 
 def _chip(text: str, paper: Colour, letters: Colour, size: int) -> Image:

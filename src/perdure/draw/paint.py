@@ -120,7 +120,11 @@ class _Stroke(NamedTuple):
 def _canvas(frame: Frame, scene: Scene) -> Image:
     if frame.image is not None:
         return frame.image.copy()
-    return np.full((scene.height, scene.width, 3), _CANVAS, np.uint8)
+    canvas = np.empty((scene.height, scene.width, 3), np.uint8)
+    cv2.rectangle(
+        canvas, (0, 0), (scene.width, scene.height), _CANVAS, cv2.FILLED
+    )  # many times faster than np.full
+    return canvas
 
 
 def _inside(rows: Tracks, height: int, width: int) -> NDArray[np.bool_]:
