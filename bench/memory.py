@@ -68,10 +68,12 @@ def peak(video: Path, run: Path, *, film: bool) -> tuple[float, int]:
     """Track a video in a process of its own; its peak resident memory in MiB and its frames."""
     command = [sys.executable, "-c", "from perdure.cli import main; main()", "track", str(video), "-o", str(run)]
     process = subprocess.Popen([*command, "--json", *([] if film else ["--no-video"])], stdout=subprocess.PIPE)
-    printed = process.stdout.read().decode()
+    with process.stdout as told:
+        printed = told.read().decode()
     _, status, usage = os.wait4(process.pid, 0)
-    if status:
-        sys.exit(f"perdure track ended with status {os.waitstatus_to_exitcode(status)}")
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(f"perdure track ended with status {process.returncode}")
     return usage.ru_maxrss / 1024, json.loads(printed.splitlines()[-1])["frames"]
 
 
