@@ -1,0 +1,92 @@
+"""What is seen in a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from perdure.types.arrays import Boxes, as_boxes, check_lengths, frozen, row_index, same_columns
+from perdure.types.frame import Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """What is seen in one frame: N rows in the detector's own order.
+
+    Parameters
+    ----------
+    boxes : (N, 4) float32
+        Half-open pixels.
+    scores : (N,) float32
+        In [0, 1]; 1 where the detector gives none.
+    classes : (N,) str
+        Empty where not known.
+    masks : N of Mask
+        Empty masks where the detector gives none.
+    data : mapping of str to (N, ...) arrays
+        Whatever else the detector said; kept, never read.
+    """
+
+    boxes: Boxes
+    scores: NDArray[np.float32]
+    classes: NDArray[np.str_]
+    masks: tuple[Mask, ...]
+    data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "boxes", as_boxes(self.boxes))
+        object.__setattr__(self, "scores", frozen(np.asarray(self.scores, np.float32)))
+        object.__setattr__(self, "classes", frozen(np.asarray(self.classes, np.str_)))
+        object.__setattr__(self, "masks", tuple(self.masks))
+        check_lengths(len(self.boxes), {"scores": self.scores, "classes": self.classes, "masks": self.masks})
+        check_lengths(len(self.boxes), self.data)
+
+    @staticmethod
+    def of(
+        boxes: ArrayLike,
+        scores: ArrayLike | None = None,
+        classes: Sequence[str] | NDArray[np.str_] | None = None,
+        masks: Sequence[Mask] | None = None,
+        data: Mapping[str, NDArray[Any]] | None = None,
+    ) -> Regions:
+        """Make regions from boxes; what is not given is filled in.
+
+        >>> len(Regions.of([[10, 20, 30, 60]], scores=[0.9]))
+        1
+        """
+        boxes = as_boxes(boxes)
+        count = len(boxes)
+        return Regions(
+            boxes,
+            np.ones(count, np.float32) if scores is None else np.asarray(scores, np.float32),
+            np.full(count, "", dtype=np.str_) if classes is None else np.asarray(classes, np.str_),
+            (Mask.empty(),) * count if masks is None else tuple(masks),
+            {} if data is None else dict(data),
+        )
+
+    @staticmethod
+    def empty() -> Regions:
+        """Return the regions of a frame in which nothing is seen."""
+        return Regions.of(np.zeros((0, 4), np.float32))
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+    def take(self, rows: ArrayLike) -> Regions:
+        """Return the named rows (indices or a bool array), in that order."""
+        index = row_index(rows, len(self))
+        return Regions(
+            self.boxes[index],
+            self.scores[index],
+            self.classes[index],
+            tuple(self.masks[i] for i in index),
+            {key: np.asarray(values)[index] for key, values in self.data.items()},
+        )
+
+    def equals(self, other: Regions) -> bool:
+        """Return whether both say the same, `data` apart."""
+        return same_columns(self, other, ("boxes", "scores", "classes", "masks"))
