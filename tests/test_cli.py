@@ -285,5 +285,5 @@ def test_the_regions_file_of_detect_holds_silhouettes(place: Path):
     from perdure.files.regions import read_regions
 
     perdure("detect", "walk.avi", "-o", "masks.jsonl", at=place)
-    regions: Regions = read_regions(place / "masks.jsonl")(20)
+    regions: Regions = read_regions(place / "masks.jsonl")[20]
     assert [mask.area > 50 for mask in regions.masks] == [True, True]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from perdure.files.video import Source, open_source
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
 
+_LEAST_COVER = 0.2  # of the frames: detections for fewer are worth a note
 FIRST_LOOKS = 25  # frames spread over a file that a detector may see first
 
 AnySource = str | Path | int | Iterable[NDArray[np.uint8]]
@@ -42,7 +44,20 @@ class Plan:
         if not (self.source.rereadable and self.source.has_images and hasattr(self.detector, "prepare")):
             return self
         looked = self.detector.prepare(self.source.sample(FIRST_LOOKS))
-        return Plan(**{**self.__dict__, "detector": looked})
+        return dataclasses.replace(self, detector=looked)
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what the user should know about how source and detections went together."""
+        if not isinstance(self.detector, Recorded) or not self.source.count:
+            return ()
+        frames, count = self.detector.regions.keys(), self.source.count
+        if not frames:
+            return ("the file of detections is empty",)
+        if len(frames) >= _LEAST_COVER * count and min(frames) < count:
+            return ()
+        return (
+            f"the file of detections covers {len(frames)} frames ({min(frames)} to {max(frames)}); the source has {count}",
+        )
 
     def seen(self, frames: Iterable[Frame] | None = None) -> Iterator[tuple[Frame, Regions]]:
         """Yield every frame with its regions, of the wanted classes only."""
@@ -107,7 +122,7 @@ def plan(
         of_tracker, of_detector = split(parameters or {}, tracker, name)
     made_detector = params.build(DETECTORS[name], of_detector)
     if name == "recorded":
-        made_detector = Recorded(**params.values(made_detector), regions_of=read_regions(Path(str(detector))))  # type: ignore[arg-type]
+        made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
     for what, made in (("detector", made_detector), ("tracker", made_tracker)):
         if made.needs_pixels and not opened.has_images:
             raise ParameterError(f"{opened.name} has no images and this {what} needs them; name a --detector FILE")
@@ -120,8 +135,21 @@ def plan(
 def track(source: AnySource, **options: Any) -> Tracks:
     """Track every moving thing in a source and return the settled tracks.
 
-    Takes the options of `plan`; parameters of detector and tracker may be given by name.
-    A damaged video gives a warning and the tracks of everything before the damage.
+    Every status is among the rows; `counted()` leaves those that count for results. A damaged video gives a
+    warning and the tracks of everything before the damage.
+
+    Parameters
+    ----------
+    source : str, Path, int or iterable of (H, W, 3) uint8 arrays
+        A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
+    options
+        Those of `plan`: tracker, detector, fps, start, end, stride, roi, classes; and parameters of the
+        detector and the tracker by name.
+
+    Raises
+    ------
+    VideoError, FormatError, ParameterError
+        The caller's mistake, in one line.
 
     >>> blank = np.zeros((48, 64, 3), np.uint8)
     >>> len(track([blank, blank, blank], patience=2.0))

@@ -18,17 +18,17 @@ def test_regions_with_masks_scores_and_classes_read_back(tmp_path: Path):
     seen[5] = (seen[5][0], Regions.of([[0.1, 2, 3, 4]], scores=np.float32([0.3]), classes=["dog"]))
     write_regions(tmp_path / "r.jsonl", seen)
     again = read_regions(tmp_path / "r.jsonl")
-    assert all(again(frame.index).equals(regions) for frame, regions in seen)
+    assert all(again[frame.index].equals(regions) for frame, regions in seen)
 
 
 def test_a_frame_that_is_not_there_has_no_regions(tmp_path: Path):
     write_regions(tmp_path / "r.jsonl", [(Frame(3, 0.3), Regions.of([[0, 0, 1, 1]]))])
-    assert len(read_regions(tmp_path / "r.jsonl")(2)) == 0
+    assert list(read_regions(tmp_path / "r.jsonl")) == [3]
 
 
 def test_boxes_alone_go_through_motchallenge_text(tmp_path: Path):
     write_regions(tmp_path / "r.txt", [(Frame(3, 0.3), Regions.of([[0, 0, 10, 20]], scores=[0.5]))])
-    again = read_regions(tmp_path / "r.txt")(3)
+    again = read_regions(tmp_path / "r.txt")[3]
     assert (again.boxes.tolist(), again.scores.tolist()) == ([[0, 0, 10, 20]], [0.5])
 
 

@@ -19,9 +19,8 @@ every_world = pytest.mark.parametrize("world", [make() for make in WORLDS.values
 
 def detector_for(kind, world: World):
     """A detector that can work in this world: a recorded one gets the world's own regions."""
-    if "regions_of" in kind.__dataclass_fields__:
-        seen = {frame.index: regions for frame, regions in world.seen()}
-        return kind(regions_of=lambda index: seen.get(index, Regions.empty()))
+    if "regions" in kind.__dataclass_fields__:
+        return kind(regions={frame.index: regions for frame, regions in world.seen()})
     return kind()
 
 

@@ -15,6 +15,7 @@ from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
 from perdure.files.regions import check_ending, write_regions
+from perdure.files.whole import refuse_existing
 from perdure.pipeline import plan
 from perdure.types import Frame, Regions
 
@@ -37,10 +38,12 @@ def detect(
     end: options.EndOption = None,
     stride: options.StrideOption = 1,
     parameters: options.ParametersOption = None,
+    overwrite: options.OverwriteOption = False,
     json_: options.JsonOption = False,
 ) -> None:
     """Write the regions of SOURCE to a file that `perdure track --detector FILE` reads."""
     check_ending(output)
+    refuse_existing(output, overwrite=overwrite)
     made = plan(
         source,
         detector=detector,
@@ -62,7 +65,7 @@ def detect(
 
     with Ending() as ending:
         watched_frames = ending.frames(watched(made.source, f"detecting in {made.source.name}", made.source.count))
-        count = write_regions(output, counted(made.prepared().seen(watched_frames)))
+        count = write_regions(output, counted(ending.first_look(made).seen(watched_frames)))
     made.source.close()
     for warning in made.source.warnings:
         print(f"perdure: note: {warning}", file=sys.stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -9,9 +10,10 @@ import typer
 
 from perdure.cli import options
 from perdure.cli.film import draw_film
-from perdure.errors import OutputError, VideoError
+from perdure.errors import VideoError
 from perdure.files.runs import RunFolder
 from perdure.files.video import open_source
+from perdure.files.whole import refuse_existing
 
 
 def draw(
@@ -22,17 +24,18 @@ def draw(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="The film: .mp4 or .webm.", show_default=False)
     ],
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace FILE.")] = False,
+    overwrite: options.OverwriteOption = False,
     fps: options.FpsOption = None,
     start: options.StartOption = None,
     end: options.EndOption = None,
     stride: options.StrideOption = 1,
+    json_: options.JsonOption = False,
 ) -> None:
     """Draw the tracks of RUN over SOURCE: boxes, outlines, ids, trails."""
     folder = RunFolder.open(run)
-    if output.exists() and not overwrite:
-        raise OutputError(f"{output} is there already; add --overwrite or name another file with -o")
-    window = folder.read_about().get("window", {})
+    refuse_existing(output, overwrite=overwrite)
+    about = folder.read_about()
+    window = about.get("window", {})
     opened = open_source(
         source,
         fps=fps if fps is not None else window.get("fps"),
@@ -42,6 +45,11 @@ def draw(
     )
     if not opened.rereadable:
         raise VideoError(f"{source} cannot be read a second time; its film was drawn while it was tracked")
+    size = (about.get("width", opened.width), about.get("height", opened.height))
+    if size != (opened.width, opened.height):
+        raise VideoError(
+            f"{source} is {opened.width}x{opened.height}, the run was over {about.get('source')} of {size[0]}x{size[1]}"
+        )
     draw_film(opened, opened.scene(None), folder, opened.count, output)
     opened.close()
-    print(f"film: {output}")
+    print(json.dumps({"output": str(output)}) if json_ else f"film: {output}")

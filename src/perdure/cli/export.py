@@ -14,7 +14,7 @@ from perdure.cli import options
 from perdure.errors import ParameterError
 from perdure.files.mot import write_rows
 from perdure.files.runs import Reporting, RunFolder
-from perdure.files.whole import whole_file
+from perdure.files.whole import refuse_existing, whole_file
 from perdure.types import Status, Tracks
 
 CSV_COLUMNS = (
@@ -46,13 +46,18 @@ def export(
     chosen: dict[str, object],
     format_: Annotated[
         str,
-        typer.Option("--format", help="mot: MOTChallenge text, frames and pixels from 1; csv: all plain columns."),
+        typer.Option(
+            "--format",
+            help="mot: MOTChallenge text, frames and pixels from 1; csv: all plain columns, frames and pixels from 0.",
+        ),
     ] = "mot",
+    overwrite: options.OverwriteOption = False,
     json_: options.JsonOption = False,
 ) -> None:
     """Write the rows of RUN that count in another format."""
     if format_ not in FORMATS:
         raise ParameterError(params.unknown_name("format", format_, FORMATS))
+    refuse_existing(output, overwrite=overwrite)
     folder = RunFolder.open(run)
     said = {**folder.read_about().get("reporting", {}), **chosen}
     reporting = params.build(Reporting, said)

@@ -70,6 +70,7 @@ ParametersOption = Annotated[
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print the result as one JSON object on the last line, for machines.")
 ]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the file that is there.")]
 DetectorOption = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(

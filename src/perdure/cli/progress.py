@@ -21,13 +21,13 @@ from rich.progress import Task as RichTask
 from rich.text import Text
 
 T = TypeVar("T")
-_QUIET_INTERVAL = 30.0  # s between lines where stderr is not a terminal
+_QUIET_INTERVAL = 10.0  # s between lines where stderr is not a terminal
 
 
 def watched(items: Iterable[T], what: str, total: int | None, unit: str = "frames") -> Iterator[T]:
     """Yield the items while a line on stderr tells how far it is.
 
-    On a terminal a bar with rate and time left; elsewhere a plain line every half minute.
+    On a terminal a bar with rate and time left; elsewhere a plain line every ten seconds.
     """
     if sys.stderr.isatty():
         yield from _with_bar(items, what, total)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from types import FrameType, TracebackType
 
 from perdure.errors import DamagedVideo
+from perdure.pipeline import Plan
 from perdure.types import Frame
 
 
@@ -29,6 +30,17 @@ class Ending:
         if self.interrupted:
             return "interrupted"
         return "done" if self.damage is None else "damaged"
+
+    def first_look(self, plan: Plan) -> Plan:
+        """Return the plan with its first look taken, or as it was if the user interrupts."""
+        self._waiting = True
+        try:
+            return plan.prepared()
+        except KeyboardInterrupt:
+            self.interrupted = True
+            return plan
+        finally:
+            self._waiting = False
 
     def frames(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """Yield the frames; damage and interruption end them quietly."""

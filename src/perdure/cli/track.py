@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import sys
@@ -12,8 +13,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from perdure import params
 from perdure.cli import options
@@ -73,7 +72,9 @@ def track(
     folder = RunFolder.create(output or Path("perdure-runs") / made.source.name, overwrite=overwrite)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
     outcome = run(made, folder, reporting, window=window, film=not no_video)
-    show(outcome, folder, as_json=json_)
+    show(outcome, folder, as_json=json_, wants_film=not no_video)
+    if outcome.frames and not (no_video or outcome.has_film):
+        raise typer.Exit(130)  # interrupted while the film was drawn
     if outcome.code:
         raise typer.Exit(outcome.code)
 
@@ -84,7 +85,8 @@ class Outcome:
 
     frames: int
     totals: Totals
-    seconds: float  # of tracking, without the film
+    seconds: float  # of tracking: first look, detection, tracking, results
+    film_seconds: float  # of drawing; 0 where it was drawn while tracking, or not at all
     status: str  # done, damaged, interrupted
     message: str  # of the damage
     warnings: tuple[str, ...]
@@ -94,6 +96,11 @@ class Outcome:
     def code(self) -> int:
         """The exit code."""
         return {"done": 0, "damaged": 3, "interrupted": 130}[self.status]
+
+    @property
+    def rate(self) -> float:
+        """Frames tracked a second."""
+        return self.frames / self.seconds if self.seconds > 0 else 0.0
 
 
 def run(
@@ -107,36 +114,42 @@ def run(
     live_film = film and not made.source.rereadable
     with Ending() as ending, RunLog(folder.log) as log:
         frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
-        steps: Iterable[Step] = made.prepared().steps(frames)
+        steps: Iterable[Step] = ending.first_look(made).steps(frames)
         if live_film:
             steps = drawn_while_running(steps, made.scene, folder.film)
         for step in steps:
             log.append(-1 if step.frame is None else step.frame.index, counted.time(step.frame), step.report)
-    seconds = time.monotonic() - begun
-    status, totals = ending.status, folder.write_results(reporting)
-    about |= {
-        "frames": counted.frames,
-        "message": str(ending.damage or ""),
-        "warnings": list(made.source.warnings),
-    }
-    folder.write_about({**about, "status": status, **dataclasses.asdict(totals)})
-    has_film = live_film and folder.film.exists()
-    if film and not live_film and status != "interrupted":
-        has_film = draw_film(made.source, made.scene, folder, counted.frames)
+    totals = folder.write_results(reporting)
+    tracked = time.monotonic()
+    message, warnings = str(ending.damage or ""), (*made.source.warnings, *made.notes())
+    about |= {"frames": counted.frames, "message": message, "warnings": list(warnings)}
+    folder.write_about({**about, "status": ending.status, **dataclasses.asdict(totals)})
+    if film and not live_film and not ending.interrupted:
+        with contextlib.suppress(KeyboardInterrupt):
+            draw_film(made.source, made.scene, folder, counted.frames)
     made.source.close()
-    message = str(ending.damage or "")
-    return Outcome(counted.frames, totals, seconds, status, message, tuple(made.source.warnings), has_film)
+    return Outcome(
+        frames=counted.frames,
+        totals=totals,
+        seconds=tracked - begun,
+        film_seconds=time.monotonic() - tracked if film and not live_film else 0.0,
+        status=ending.status,
+        message=message,
+        warnings=warnings,
+        has_film=folder.film.exists(),
+    )
 
 
-def show(outcome: Outcome, folder: RunFolder, *, as_json: bool) -> None:
-    """Print the closing table, and on the last line of stdout the JSON object if asked."""
+def show(outcome: Outcome, folder: RunFolder, *, as_json: bool, wants_film: bool) -> None:
+    """Print how the run ended; as one JSON object on the last line of stdout if asked."""
     for warning in outcome.warnings:
         print(f"perdure: note: {warning}", file=sys.stderr)
     if outcome.message:
         print(f"perdure: {outcome.message}", file=sys.stderr)
     if outcome.status == "interrupted":
         print(f"perdure: interrupted; everything so far is in {folder.path}", file=sys.stderr)
-    rate = outcome.frames / outcome.seconds if outcome.seconds > 0 else 0.0
+    elif wants_film and not outcome.has_film and outcome.frames:
+        print("perdure: the film is not finished; the tracks are. `perdure draw` draws it", file=sys.stderr)
     if as_json:
         value = {
             "status": outcome.status,
@@ -144,20 +157,18 @@ def show(outcome: Outcome, folder: RunFolder, *, as_json: bool) -> None:
             "run": str(folder.path),
             "frames": outcome.frames,
             "seconds": round(outcome.seconds, 3),
-            "rate": round(rate, 2),
+            "rate": round(outcome.rate, 2),
+            "film_seconds": round(outcome.film_seconds, 3),
             **dataclasses.asdict(outcome.totals),
         }
         print(json.dumps(value))
         return
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    table.add_row("frames", str(outcome.frames))
-    table.add_row("tracks", f"{outcome.totals.tracks} ({outcome.totals.rows} rows)")
-    table.add_row("events", str(outcome.totals.events))
-    table.add_row("rate", f"{rate:.1f} frames/s")
-    table.add_row("results", str(folder.path / "tracks.txt"))
+    print(f"frames   {outcome.frames}, tracked in {outcome.seconds:.1f} s ({outcome.rate:.0f} frames/s)")
+    print(f"tracks   {outcome.totals.tracks} ({outcome.totals.rows} rows), {outcome.totals.events} events")
+    print(f"results  {folder.path / 'tracks.txt'}")
     if outcome.has_film:
-        table.add_row("film", str(folder.film))
-    Console().print(table)
+        drawn = f"  (drawn in {outcome.film_seconds:.1f} s)" if outcome.film_seconds else ""
+        print(f"film     {folder.film}{drawn}")
 
 
 class _Count:

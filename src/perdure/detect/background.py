@@ -67,8 +67,8 @@ class Background:
     )
     darkest_shadow: float = parameter(
         0.8,
-        "what is darker than the background in its own colour, down to this share of its brightness, is shadow",
-        unit="1 for none",
+        "what is darker than the background, but of its colour and no darker than this share, is shadow; 1: none",
+        unit="of its brightness",
         low=0.0,
         high=1.0,
     )

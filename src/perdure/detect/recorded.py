@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,14 +23,14 @@ class RecordedState:
 class Recorded:
     """Regions looked up by frame number; a frame that is not in the record has none.
 
-    >>> detector = Recorded(regions_of=lambda index: Regions.of([[0, 0, 9, 9]], scores=[0.2]), least_score=0.5)
+    >>> detector = Recorded(regions={0: Regions.of([[0, 0, 9, 9]], scores=[0.2])}, least_score=0.5)
     >>> _, regions = detector.step(detector.start(Scene(64, 48)), Frame(0, 0.0))
     >>> len(regions)
     0
     """
 
     least_score: float = parameter(0.0, "recorded regions with a lower score are left out", low=0.0, high=1.0)
-    regions_of: Callable[[int], Regions] = field(default=lambda index: Regions.empty(), repr=False, compare=False)
+    regions: Mapping[int, Regions] = field(default_factory=dict, repr=False, compare=False)
 
     needs_pixels = False
 
@@ -40,7 +40,7 @@ class Recorded:
 
     def step(self, state: RecordedState, frame: Frame) -> tuple[RecordedState, Regions]:
         """Return the recorded regions of one frame whose centre lies in the roi."""
-        regions = self.regions_of(frame.index)
+        regions = self.regions.get(frame.index, Regions.empty())
         kept = regions.scores >= self.least_score
         if state.roi is not None and len(regions):
             height, width = state.roi.shape

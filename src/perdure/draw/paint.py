@@ -235,6 +235,8 @@ def _box_stroke(box: NDArray[np.float32], look: _Look, style: _Style) -> _Stroke
     x2, y2 = max(x2 - 1, x1), max(y2 - 1, y1)  # half-open: the last pixel inside
     if look.group:
         return _Stroke(_brackets(x1, y1, x2, y2, style), look.colour, style.line)
+    if not look.bold and min(x2 - x1, y2 - y1) < 4 * style.dash:  # dashes would not make a box
+        return _Stroke(_brackets(x1, y1, x2, y2, style), look.colour, style.thin)
     if not any(look.dashes):
         ring = np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]], np.int32)
         return _Stroke([ring], look.colour, style.line)
@@ -286,8 +288,10 @@ def _darken_beneath(picture: Image, strokes: Sequence[_Stroke], style: _Style) -
 
 
 def _labels(rows: Tracks, looks: Sequence[_Look], style: _Style) -> list[Label]:
-    """The labels, the surest and nearest first: they choose their places first."""
-    order = sorted(range(len(rows)), key=lambda i: (looks[i].bold, float(rows.boxes[i][3])), reverse=True)
+    """The labels, the surest and nearest first: they choose their places first; small unseen targets have none."""
+    sides = np.minimum(*(rows.boxes[:, 2:] - rows.boxes[:, :2]).T)
+    named = [i for i in range(len(rows)) if looks[i].bold or sides[i] > 1.5 * style.letters]
+    order = sorted(named, key=lambda i: (looks[i].bold, float(rows.boxes[i][3])), reverse=True)
     return [
         Label(
             look.text, look.colour, look.bold, _whole(rows.boxes[i]), style.gap if look.group else style.line // 2

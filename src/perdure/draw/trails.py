@@ -14,6 +14,8 @@ from perdure.draw.colours import DARK, Colour, colour_of
 from perdure.types import Image, Status, Tracks
 
 _TRAIL_PIECES = 6
+_REACH = 2  # points on either side that a drawn point is averaged over
+_JUMP = 6.0  # a step this many times the usual is no movement but another box: the trail breaks there
 _TRAIL_RATE = 10.0  # points drawn a second
 
 
@@ -80,10 +82,29 @@ def _paths(trails: Trails, time: float) -> list[_Path]:
         tick = np.floor(trails.times[own] * _TRAIL_RATE)  # of the clock, not of the trail: else it would shiver
         own = own[np.concatenate([tick[1:] != tick[:-1], [True]])]
         points = np.clip(trails.points[own], -16000, 16000)
-        if len(points) > 1:
-            fresh = np.clip(1.0 - (time - trails.times[own]) / span, 0.0, 1.0)
-            paths.append(_Path(points, fresh, colour_of(identity)))
+        if len(points) < 2:
+            continue
+        fresh = np.clip(1.0 - (time - trails.times[own]) / span, 0.0, 1.0)
+        stride = np.hypot(*np.diff(points, axis=0).T)
+        jumps = np.flatnonzero(stride > _JUMP * (np.median(stride) + 4.0)) + 1
+        for part, ages in zip(np.split(points, jumps), np.split(fresh, jumps), strict=True):
+            if len(part) > 1:
+                paths.append(_Path(_smooth(part), ages, colour_of(identity)))
     return paths
+
+
+def _smooth(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Average each point with its neighbours over half a second; the foot of a box jumps with its legs."""
+    padded = (
+        np.pad(points, ((_REACH, _REACH), (0, 0)), mode="reflect", reflect_type="odd")
+        if len(points) > _REACH
+        else points
+    )
+    if len(padded) == len(points):
+        return points
+    sums = np.cumsum(np.concatenate([np.zeros((1, 2)), padded]), axis=0)  # (n + 2 reach + 1, 2)
+    width = 2 * _REACH + 1
+    return np.asarray((sums[width:] - sums[:-width]) / width, np.float32)
 
 
 def _fade_in(picture: Image, path: _Path, line: int, halo: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +41,8 @@ def check_ending(path: Path) -> None:
         )
 
 
-def read_regions(path: Path) -> Callable[[int], Regions]:
-    """Return a look-up from frame number (from 0) to regions, for either kind of file.
+def read_regions(path: Path) -> Mapping[int, Regions]:
+    """Return the regions by frame number (from 0), for either kind of file; silhouettes stay on disk.
 
     Raises
     ------
@@ -50,12 +50,26 @@ def read_regions(path: Path) -> Callable[[int], Regions]:
         Naming file and line, if it is neither.
     """
     if path.suffix != ".jsonl":
-        table: Mapping[int, Regions] = read_detections(path)
-        return lambda index: table.get(index, Regions.empty())
-    places: dict[int, tuple[int, int]] = {}  # frame -> line number, byte offset: the masks stay on disk
-    for line in read_lines(path, FORMAT, VERSION):
-        places[_frame_of(path, line)] = line.number, line.offset
-    return lambda index: _of_line(line_at(path, *places[index])) if index in places else Regions.empty()
+        return read_detections(path)
+    return _OnDisk(
+        path, {_frame_of(path, line): (line.number, line.offset) for line in read_lines(path, FORMAT, VERSION)}
+    )
+
+
+class _OnDisk(Mapping[int, Regions]):
+    """Regions by frame, each read when it is asked for."""
+
+    def __init__(self, path: Path, places: Mapping[int, tuple[int, int]]) -> None:
+        self._path, self._places = path, places  # frame -> line number, byte offset
+
+    def __getitem__(self, index: int) -> Regions:
+        return _of_line(line_at(self._path, *self._places[index]))
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
 
 
 def _frame_of(path: Path, line: Line) -> int:

@@ -75,7 +75,8 @@ class RunFolder:
             if there - {".DS_Store"} and "run.json" not in there:
                 raise OutputError(f"{path} holds other files; name a new folder with -o")
             if "run.json" in there and not overwrite:
-                raise OutputError(f"{path} holds a run already; add --overwrite, or name another folder with -o")
+                of = RunFolder(path).read_about().get("source", "another source")
+                raise OutputError(f"{path} holds a run of {of}; add --overwrite, or name another folder with -o")
             path.mkdir(parents=True, exist_ok=True)
             for name in PARTS:
                 (path / name).unlink(missing_ok=True)

@@ -33,6 +33,20 @@ def whole_file(path: Path) -> Iterator[IO[str]]:
             part.unlink(missing_ok=True)
 
 
+def refuse_existing(path: Path, *, overwrite: bool) -> None:
+    """Refuse to write over a file that is there, unless that is asked.
+
+    Raises
+    ------
+    OutputError
+        If it is there and `overwrite` is not asked, or if it is a folder.
+    """
+    if path.is_dir():
+        raise OutputError(f"{path} is a folder; name a file with -o")
+    if path.exists() and not overwrite:
+        raise OutputError(f"{path} is there already; add --overwrite or name another file with -o")
+
+
 def cannot_write(path: Path, error: OSError) -> OutputError:
     """Say that a place cannot be written and why."""
     return OutputError(f"cannot write {path}: {error.strerror or error}; name another place with -o")

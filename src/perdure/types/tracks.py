@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from perdure.errors import PerdureError
 from perdure.types.arrays import Boxes, as_boxes, check_lengths, frozen, row_index, same_columns
 from perdure.types.frame import Mask
 
@@ -217,8 +218,11 @@ class Tracks:
         return self.take(~hidden & (self.status != Status.LOST) & ~self.is_group)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the plain columns as a pandas DataFrame (pandas must be installed)."""
-        import pandas
+        """Return the plain columns as a pandas DataFrame (the extra `perdure[pandas]`)."""
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise PerdureError("a table needs pandas: pip install 'perdure[pandas]'") from None
 
         boxes = dict(zip(("x1", "y1", "x2", "y2"), self.boxes.T, strict=True))
         plain = {
