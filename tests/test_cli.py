@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -271,6 +272,103 @@ def test_ctrl_c_ends_cleanly_with_everything_so_far_kept(tmp_path: Path):
     assert 10 < frames < len(images)
     assert json.loads((tmp_path / "run/run.json").read_text())["status"] == "interrupted"
     assert len(read_tracks(tmp_path / "run/tracks.txt")) > 0
+
+
+def test_a_run_that_would_replace_its_own_source_is_refused(place: Path):
+    perdure("track", "walk.avi", "-o", "own", at=place)
+    before = {path.name: path.read_bytes() for path in (place / "own").iterdir()}
+    refused = perdure("track", "own/tracked.mp4", "-o", "own", "--overwrite", at=place)
+    assert (refused.returncode, "own/tracked.mp4" in refused.stderr) == (2, True)
+    assert {path.name: path.read_bytes() for path in (place / "own").iterdir()} == before
+    kept = (place / "walk.avi").read_bytes()
+    (place / "walk.mp4").write_bytes((place / "own/tracked.mp4").read_bytes())
+    assert perdure("draw", "walk.mp4", "own", "-o", "walk.mp4", "--overwrite", at=place).returncode == 2
+    assert (place / "walk.avi").read_bytes() == kept
+
+
+def test_files_that_are_there_are_not_written_over_unasked(place: Path):
+    (place / "precious.txt").write_text("1,1,1,1,1,1")
+    for words in (["detect", "walk.avi"], ["export", "first"]):
+        refused = perdure(*words, "-o", "precious.txt", at=place)
+        assert (refused.returncode, "--overwrite" in refused.stderr) == (2, True)
+    assert (place / "precious.txt").read_text() == "1,1,1,1,1,1"
+    assert perdure("export", "first", "-o", "precious.txt", "--overwrite", at=place).returncode == 0
+
+
+def test_draw_over_a_film_of_another_size_is_refused(place: Path):
+    write_film(place / "small.avi", [np.zeros((40, 60, 3), np.uint8)] * 5)
+    done = perdure("draw", "small.avi", "first", "-o", "wrong.mp4", at=place)
+    assert (done.returncode, (place / "wrong.mp4").exists()) == (2, False)
+    assert "60x40" in done.stderr
+
+
+def test_draw_over_a_damaged_film_says_so(place: Path):
+    data = (place / "walk.avi").read_bytes()
+    (place / "torn.avi").write_bytes(data[: len(data) * 3 // 4])
+    done = perdure("draw", "torn.avi", "first", "-o", "torn.mp4", at=place)
+    assert (done.returncode, (place / "torn.mp4").exists()) == (3, True)
+    assert "frame" in done.stderr
+
+
+def test_a_usage_mistake_is_one_line_with_meaning_and_range(place: Path):
+    done = perdure("track", "walk.avi", "-o", "x", "--patience", "long", at=place)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "0 to 3600 s" in done.stderr
+
+
+def test_detections_for_a_part_of_the_film_only_are_worth_a_note(place: Path):
+    (place / "few.txt").write_text("1,-1,11,11,20,30,0.9\n2,-1,11,11,20,30,0.9\n")
+    done = perdure("track", "walk.avi", "-o", "few", "--no-video", "--detector", "few.txt", at=place)
+    assert "covers 2 frames" in done.stderr
+
+
+@pytest.mark.parametrize("damage", ['{"window": null}', '{"reporting": 3}', "[" * 100_000, "[]", "nonsense"])
+def test_a_damaged_run_json_is_named(place: Path, damage: str):
+    perdure("track", "walk.avi", "-o", "hurt", "--no-video", "--overwrite", at=place)
+    (place / "hurt/run.json").write_text(damage)
+    done = perdure("export", "hurt", "-o", "hurt.txt", "--overwrite", at=place)
+    assert (done.returncode, "run.json" in done.stderr, "Traceback" in done.stderr) == (2, True, False)
+
+
+@pytest.mark.parametrize(
+    "values", ["[" * 100_000, '{"patience": 1, "patience": 2}', '{"patience": ' + "9" * 400 + "}"]
+)
+def test_a_parameter_file_that_cannot_be_is_refused(place: Path, values: str):
+    (place / "odd.json").write_text(values)
+    done = perdure("track", "walk.avi", "-o", "x", "--parameters", "odd.json", at=place)
+    assert (done.returncode, (place / "x").exists(), "Traceback" in done.stderr) == (2, False, False)
+
+
+def test_a_run_without_a_terminal_or_an_error_stream_is_a_run(place: Path):
+    words = shlex.join([*PERDURE, "track", "walk.avi", "--no-video", "-o"])
+    assert subprocess.run(f"{words} silent 2>&-", shell=True, cwd=place, capture_output=True).returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_standard_output_is_said_in_one_line(place: Path):
+    words = shlex.join([*PERDURE, "track", "walk.avi", "--no-video", "-o", "loud"])
+    done = subprocess.run(f"{words} > /dev/full", shell=True, cwd=place, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert "No space" in done.stderr
+
+
+def test_a_failed_run_leaves_no_wreck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    from perdure import pipeline
+    from perdure.cli.track import run
+    from perdure.files.runs import Reporting, RunFolder
+
+    def broken(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("perdure.cli.track.RunLog.append", broken)
+    plan = pipeline.plan([frame.image for frame in two_apart().frames()], fps=10)
+    with pytest.raises(OSError, match="No space"):
+        run(plan, RunFolder.create(tmp_path / "run", overwrite=False), Reporting(), film=False)
+    status = (
+        json.loads((tmp_path / "run/run.json").read_text())["status"] if (tmp_path / "run").exists() else "gone"
+    )
+    assert status in ("failed", "gone")
 
 
 def test_help_tells_meaning_range_and_default_of_every_parameter():

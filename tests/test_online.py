@@ -84,6 +84,48 @@ def test_what_are_no_detections_is_refused_with_what_would_do(wrong):
         perdure.Online("overlap").update(wrong)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"timestamp": float("inf")},
+        {"timestamp": float("nan")},
+        {"timestamp": "soon"},
+        {"frame": np.zeros((4, 4, 3))},
+    ],
+)
+def test_what_is_refused_uses_up_neither_frame_number_nor_time(wrong):
+    tracker = perdure.Online("overlap", confirm=0.0)
+    with pytest.raises(ParameterError):
+        tracker.update(BOXES, **{"timestamp": 1.0, **wrong})
+    rows = tracker.update(BOXES, timestamp=1.0)
+    assert rows.frames.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    "boxes",
+    [[[30, 10, 10, 60]], [[0, 0, 3e38, 9]], [[0, 0, 9, 9, 5.0]], [[0, 0, 9, 9, -1.0]], [[0, 0, 9, 9, np.nan]]],
+)
+def test_boxes_and_scores_that_cannot_be_are_refused(boxes):
+    with pytest.raises(ParameterError):
+        perdure.Online("overlap").update(boxes)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"fps": "x"}, {"fps": float("inf")}, {"width": 1.5}, {"height": -5}, {"tracker": 3}]
+)
+def test_a_camera_that_cannot_be_is_refused(wrong):
+    with pytest.raises(ParameterError):
+        perdure.Online(**wrong)
+
+
+def test_a_mask_that_leaves_its_box_enlarges_what_is_said():
+    from perdure.types import Mask
+
+    regions = Regions.of([[30, 30, 40, 40]], masks=[Mask(5, 5, np.ones((15, 15), bool))])
+    rows = perdure.Online("overlap", confirm=0.0).update(regions)
+    assert rows.boxes.tolist() == [[5, 5, 40, 40]]
+
+
 def test_an_unknown_tracker_or_parameter_is_refused_with_the_nearest():
     with pytest.raises(ParameterError, match="did you mean 'overlap'"):
         perdure.Online("overlaps")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from perdure.errors import ParameterError
@@ -29,12 +30,18 @@ def test_what_is_built_reads_back():
     assert isinstance(made.patience, float)
 
 
+def test_numpy_numbers_are_numbers():
+    made = build(Example, {"patience": np.float32(2), "count": np.int64(4)})
+    assert (type(made.patience), type(made.count)) == (float, int)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         ({"patience": -1.0}, "patience = -1.0 is out of range: it must be ≥ 0 s"),
         ({"patience": float("nan")}, "out of range"),
         ({"patience": float("inf")}, "out of range"),
+        ({"patience": 10**400}, "out of range"),
         ({"count": 10}, "count = 10 is out of range: it must be 1 to 9"),
         ({"count": 2.5}, "is not a whole number"),
         ({"count": True}, "is not a whole number"),

@@ -113,3 +113,15 @@ def test_code_cannot_be_saved():
 
     with pytest.raises(StateError, match="function"):
         save(WithCode(lambda: None))
+
+
+def test_bytes_changed_anywhere_are_refused_or_harmless():
+    rng = np.random.default_rng(5)
+    data = save(whole())
+    for _ in range(300):
+        bad = bytearray(data)
+        bad[rng.integers(len(bad))] ^= int(rng.integers(1, 256))
+        try:
+            assert isinstance(load(bytes(bad), Whole), Whole)
+        except StateError:
+            continue

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +16,15 @@ from perdure.types import Frame, Mask, Regions, Report, Scene, Tracks
 
 if TYPE_CHECKING:
     import supervision
+
+
+@dataclass(frozen=True)
+class _Camera:
+    """What `Online` must know of a camera."""
+
+    fps: float = params.parameter(25.0, "frames per second without timestamps", low=0.001, high=1000.0)
+    width: int = params.parameter(0, "width of the picture, 0 where not known", unit="px", low=0, high=1 << 20)
+    height: int = params.parameter(0, "height of the picture, 0 where not known", unit="px", low=0, high=1 << 20)
 
 
 class Online:
@@ -42,12 +53,11 @@ class Online:
     def __init__(
         self, tracker: str = "overlap", *, fps: float = 25.0, width: int = 0, height: int = 0, **parameters: object
     ) -> None:
-        if tracker not in TRACKERS:
+        if not isinstance(tracker, str) or tracker not in TRACKERS:
             raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
-        if not fps > 0:
-            raise ParameterError(f"fps = {fps!r} is out of range: it must be above 0")
+        camera = params.build(_Camera, {"fps": fps, "width": width, "height": height})
         self.tracker = params.build(TRACKERS[tracker], parameters)
-        self._fps, self._size = fps, (width, height)
+        self._fps, self._size = camera.fps, (camera.width, camera.height)
         self.reset()
 
     def reset(self) -> None:
@@ -83,18 +93,29 @@ class Online:
             If time does not rise or the detections are not of a known kind.
         """
         regions = to_regions(detections)
-        self._index += 1
-        time = self._index / self._fps if timestamp is None else float(timestamp)
-        if not time > self._time:
-            self._index -= 1
-            raise ParameterError(f"timestamp {time:g} s does not come after {self._time:g} s; times must rise")
-        self._time = time
-        picture = Frame(self._index, time, frame)
+        picture = self._next_frame(frame, timestamp)
         if self._state is None:
             self._state = self.tracker.start(self._scene(frame))
         self._state, self.report = self.tracker.step(self._state, picture, regions)
+        self._index, self._time = picture.index, picture.time
         rows = self.report.rows.in_frame(self._index)
         return rows if isinstance(detections, (Regions, list, tuple, np.ndarray)) else _with_ids(detections, rows)
+
+    def _next_frame(self, image: NDArray[np.uint8] | None, timestamp: float | None) -> Frame:
+        """The next frame, checked; what is refused uses up neither its number nor its time."""
+        index = self._index + 1
+        try:
+            time = index / self._fps if timestamp is None else float(timestamp)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"timestamp {timestamp!r:.40} is not a number of seconds") from error
+        if not math.isfinite(time):
+            raise ParameterError(f"timestamp {time} is not a finite number of seconds")
+        if not time > self._time:
+            raise ParameterError(f"timestamp {time:g} s does not come after {self._time:g} s; times must rise")
+        try:
+            return Frame(index, time, None if image is None else np.asarray(image))
+        except ValueError as error:
+            raise ParameterError(str(error)) from error
 
     def _scene(self, frame: NDArray[np.uint8] | None) -> Scene:
         width, height = self._size
@@ -107,9 +128,12 @@ def to_regions(detections: Any) -> Regions:
     """Return detections of any known kind as regions, order and data kept."""
     if isinstance(detections, Regions):
         return detections
-    if hasattr(detections, "xyxy") and hasattr(detections, "tracker_id"):
-        return _of_supervision(detections)
-    return _of_array(detections)
+    try:
+        if hasattr(detections, "xyxy") and hasattr(detections, "tracker_id"):
+            return _of_supervision(detections)
+        return _of_array(detections)
+    except ValueError as error:
+        raise ParameterError(f"these detections cannot be: {error}") from error
 
 
 def _of_array(values: ArrayLike) -> Regions:

@@ -22,9 +22,12 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import numbers
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_type_hints
+
+import numpy as np
 
 from perdure.errors import ParameterError
 
@@ -136,7 +139,7 @@ def check_value(declared: Parameter, value: object) -> None:
         if value not in declared.choices:
             raise ParameterError(f"{declared.name} = {value!r} is not known: it must be {declared.range_text}")
         return
-    if isinstance(value, (int, float)) and not (math.isfinite(value) and declared.low <= value <= declared.high):
+    if isinstance(value, numbers.Real) and not declared.low <= _finite(value) <= declared.high:
         span = f": it must be {declared.range_text}" if declared.range_text else ": it must be a finite number"
         raise ParameterError(f"{declared.name} = {value!r} is out of range{span} ({declared.help})")
 
@@ -159,16 +162,15 @@ def build(kind: type[T], given: Mapping[str, object]) -> T:
     for name, value in given.items():
         if name not in declared:
             raise ParameterError(unknown_name(f"parameter of {kind.__name__}", name, declared))
-        wanted = declared[name].kind
-        arguments[name] = float(value) if wanted is float and type(value) is int else value
-        check_value(declared[name], arguments[name])
+        check_value(declared[name], value)
+        arguments[name] = declared[name].kind(value)  # a NumPy number becomes a plain one
     return kind(**arguments)
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     """Say that `name` is not a known `what`, with the nearest known one or all of them."""
     known = sorted(known)
-    near = difflib.get_close_matches(name, known, n=1)
+    near = difflib.get_close_matches(str(name), known, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known) or 'none'}"
     return f"{name!r} is not a {what}; {hint}"
 
@@ -176,9 +178,18 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
 _KIND_WORDS: Mapping[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a word"}
 
 
+def _finite(value: numbers.Real) -> float:
+    """The number as a float; what is not finite, or larger than any, is nan: in no range."""
+    try:
+        number = float(value)
+    except OverflowError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan
+
+
 def _is_kind(value: object, kind: type) -> bool:
     if kind is float:
-        return isinstance(value, (int, float)) and not isinstance(value, bool)
+        return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_))
     if kind is int:
-        return isinstance(value, int) and not isinstance(value, bool)
+        return isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.bool_))
     return isinstance(value, kind)

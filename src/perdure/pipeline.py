@@ -6,6 +6,7 @@ import dataclasses
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,6 +54,12 @@ class Plan:
         frames, count = self.detector.regions.keys(), self.source.count
         if not frames:
             return ("the file of detections is empty",)
+        if self.classes:
+            there = {str(name) for index in islice(frames, 500) for name in self.detector.regions[index].classes}
+            if there.isdisjoint(self.classes):
+                return (
+                    f"no region is of class {', '.join(self.classes)}; there are {', '.join(sorted(there)) or 'none'}",
+                )
         if len(frames) >= _LEAST_COVER * count and min(frames) < count:
             return ()
         return (
@@ -79,7 +86,7 @@ def plan(
     end: str | float | None = None,
     stride: int = 1,
     roi: str | None = None,
-    classes: Collection[str] = (),
+    classes: str | Collection[str] | None = (),
     parameters: Mapping[str, object] | None = None,
 ) -> Plan:
     """Open a source and make the detector and tracker for it.
@@ -101,7 +108,7 @@ def plan(
         Take every n-th frame.
     roi : str or None
         Where things may be seen: an image, a polygon, a box or a file of polygons.
-    classes : collection of str
+    classes : str or collection of str
         Only regions of these classes.
     parameters : mapping
         Values of the detector's and tracker's parameters by name.
@@ -111,25 +118,25 @@ def plan(
     VideoError, FormatError, ParameterError
         The caller's mistake, in one line.
     """
-    if tracker not in TRACKERS:
+    if not isinstance(tracker, str) or tracker not in TRACKERS:
         raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
+    wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
     name = detector_name(detector)
-    of_tracker, of_detector = split(parameters or {}, tracker, name)
-    made_tracker = params.build(TRACKERS[tracker], of_tracker)
     opened = open_source(source, fps=fps, start=start, end=end, stride=stride)
     if detector is None and not opened.has_images:
         detector, name = _own_detections(opened), "recorded"
-        of_tracker, of_detector = split(parameters or {}, tracker, name)
+    of_tracker, of_detector = split(parameters or {}, tracker, name)
+    made_tracker = params.build(TRACKERS[tracker], of_tracker)
     made_detector = params.build(DETECTORS[name], of_detector)
     if name == "recorded":
         made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
     for what, made in (("detector", made_detector), ("tracker", made_tracker)):
         if made.needs_pixels and not opened.has_images:
             raise ParameterError(f"{opened.name} has no images and this {what} needs them; name a --detector FILE")
-    if classes and name == "background":
+    if wanted and name == "background":
         raise ParameterError("the background detector names no classes; leave out --class or give --detector FILE")
     scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
-    return Plan(opened, scene, name, made_detector, tracker, made_tracker, tuple(classes))
+    return Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted)
 
 
 def track(source: AnySource, **options: Any) -> Tracks:
@@ -185,12 +192,19 @@ def detector_name(detector: str | Path | None) -> str:
     """Return which kind of detector the user's word means."""
     if detector is None or str(detector) == "background":
         return "background"
-    if Path(str(detector)).is_file():
+    if _is_file(detector):
         return "recorded"
     if Path(str(detector)).suffix in (".txt", ".jsonl", ".csv"):
         raise FormatError(f"{detector}: there is no such file of detections")
     known = [name for name in DETECTORS if name != "recorded"]
     raise ParameterError(f"{params.unknown_name('detector', str(detector), known)}, or name a file of detections")
+
+
+def _is_file(word: str | Path) -> bool:
+    try:
+        return Path(str(word)).is_file()
+    except (OSError, ValueError):  # too long, or not a path at all
+        return False
 
 
 class Split(NamedTuple):
@@ -213,6 +227,8 @@ def split(given: Mapping[str, object], tracker: str, detector: str) -> Split:
         for part, kind in (("tracker", TRACKERS[tracker]), ("detector", DETECTORS[detector]))
         for one in params.describe(kind)
     }
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"parameters must be values by name, such as {{'patience': 2.0}}, not {given!r:.60}")
     divided = Split({}, {})
     for name, value in given.items():
         if name not in owners:

@@ -24,6 +24,7 @@ import json
 import types
 import typing
 import zipfile
+import zlib
 from collections.abc import Mapping
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -79,8 +80,23 @@ def load(data: bytes, kind: type[S]) -> S:
         return typing.cast(S, _unpack(header["tree"], kind, arrays))
     except StateError:
         raise
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, IndexError, EOFError, AttributeError) as error:
+    except _DAMAGE as error:
         raise StateError(f"this saved state is damaged ({error}); start the run anew") from error
+
+
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    ArithmeticError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    NotImplementedError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 
 
 def _check_header(header: Any, kind: type) -> None:
@@ -126,7 +142,7 @@ def _unpack(tree: Any, kind: Any, arrays: list[NDArray[Any]]) -> Any:
             return None
         return _unpack(tree, next(one for one in arguments if one is not type(None)), arrays)
     if kind is np.ndarray or origin is np.ndarray:
-        return arrays[tree["array"]]
+        return dict(enumerate(arrays))[tree["array"]]
     if origin is tuple:
         if isinstance(arguments[-1], types.EllipsisType):
             return tuple(_unpack(item, arguments[0], arrays) for item in tree)

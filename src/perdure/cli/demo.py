@@ -44,7 +44,7 @@ def demo(
         write_rows(file, truth)
     folder = RunFolder.create(output / "run", overwrite=True)
     outcome = run(plan(film, tracker=tracker), folder, Reporting())
-    if outcome.status == "interrupted" or not outcome.has_film:
+    if outcome.status == "interrupted":
         raise KeyboardInterrupt
     figures = clear(folder.tracks().counted(), to_find(truth))
     things = len(set(truth.ids.tolist()))

@@ -10,7 +10,8 @@ import typer
 
 from perdure.cli import options
 from perdure.cli.film import draw_film
-from perdure.errors import VideoError
+from perdure.cli.stopping import Ending
+from perdure.errors import OutputError, VideoError
 from perdure.files.runs import RunFolder
 from perdure.files.video import open_source
 from perdure.files.whole import refuse_existing
@@ -28,7 +29,9 @@ def draw(
     fps: options.FpsOption = None,
     start: options.StartOption = None,
     end: options.EndOption = None,
-    stride: options.StrideOption = 1,
+    stride: Annotated[
+        int | None, typer.Option("--stride", metavar="N", help="Take every N-th frame.", show_default=False)
+    ] = None,
     json_: options.JsonOption = False,
 ) -> None:
     """Draw the tracks of RUN over SOURCE: boxes, outlines, ids, trails."""
@@ -41,7 +44,7 @@ def draw(
         fps=fps if fps is not None else window.get("fps"),
         start=start if start is not None else window.get("start"),
         end=end if end is not None else window.get("end"),
-        stride=stride if stride != 1 else window.get("stride", 1),
+        stride=stride if stride is not None else window.get("stride", 1),
     )
     if not opened.rereadable:
         raise VideoError(f"{source} cannot be read a second time; its film was drawn while it was tracked")
@@ -50,6 +53,14 @@ def draw(
         raise VideoError(
             f"{source} is {opened.width}x{opened.height}, the run was over {about.get('source')} of {size[0]}x{size[1]}"
         )
-    draw_film(opened, opened.scene(None), folder, opened.count, output)
+    if opened.rereadable and Path(source).exists() and output.exists() and output.samefile(source):
+        raise OutputError(f"{output} is the source itself; name another file with -o")
+    with Ending() as ending:
+        ending.at_once()
+        damage = draw_film(opened, opened.scene(None), folder, opened.count, output)
     opened.close()
+    if damage is not None and not output.exists():
+        raise damage
     print(json.dumps({"output": str(output)}) if json_ else f"film: {output}")
+    if damage is not None:
+        raise damage

@@ -17,10 +17,10 @@ from perdure.types import Scene, Tracks
 
 def draw_film(
     source: Source, scene: Scene, folder: RunFolder, count: int | None, path: Path | None = None
-) -> bool:
-    """Draw the settled tracks of a run over its source; return whether there was a frame to draw.
+) -> DamagedVideo | None:
+    """Draw the settled tracks of a run over its source; return the damage at which the source broke off, if any.
 
-    A source that breaks off ends the film there.
+    The film ends where the source does; without a frame there is none.
     """
     rows_of = _Rows(folder.settled_by_frame())
     frames = 0
@@ -34,9 +34,9 @@ def draw_film(
                 frames += 1
                 if count is not None and frames >= count:
                     break
-        except DamagedVideo:
-            pass  # the run has said so
-    return frames > 0
+        except DamagedVideo as damage:
+            return damage
+    return None
 
 
 def drawn_while_running(steps: Iterable[Step], scene: Scene, path: Path) -> Iterator[Step]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
+import os
 import sys
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -22,7 +23,6 @@ DONE, DEFECT, MISTAKE, PART_LOST, INTERRUPTED = 0, 1, 2, 3, 130
 app = typer.Typer(
     name="perdure",
     help="Follow every moving thing in a video, on an ordinary CPU, with no training.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -62,21 +62,41 @@ def about(
     """Follow every moving thing in a video, on an ordinary CPU, with no training."""
 
 
-def main() -> None:
-    """Run the command line.
+def run() -> int:
+    """Run the command that was typed and return the exit code.
 
-    Exit codes: 0 done, 1 a defect of ours, 2 the caller's mistake, 3 done but part of the input was lost,
-    130 interrupted with everything so far kept.
+    0 done, 1 a defect of ours, 2 the caller's mistake, 3 done but part of the input was lost, 130 interrupted
+    with everything so far kept.
     """
     try:
-        code = app(standalone_mode=True)
+        code = app(None if sys.argv[1:] else ["--help"], standalone_mode=False)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else DONE
+    except _UsageError as error:
+        return _say(_usage(error), MISTAKE)
     except DamagedVideo as damage:
-        code = _say(str(damage), PART_LOST)
+        return _say(str(damage), PART_LOST)
     except PerdureError as error:
-        code = _say(str(error), MISTAKE)
-    except KeyboardInterrupt:
-        code = _say("interrupted", INTERRUPTED)
-    sys.exit(code)
+        return _say(str(error), MISTAKE)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # whoever read has heard enough
+        return DONE
+    except OSError as error:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")
+        return _say(f"cannot write: {error.strerror or error}", MISTAKE)
+
+
+# What typer raises for a mistyped command line; typer names only its child publicly.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+
+
+def _usage(error: Any) -> str:
+    """One line: what was mistyped, and what the option means and takes."""
+    text = " ".join(error.format_message().split())
+    about = getattr(getattr(error, "param", None), "help", None)
+    command = error.ctx.command_path if getattr(error, "ctx", None) else "perdure"
+    hint = f"; {about[0].lower()}{about[1:]}" if about else f" (see '{command} --help')"
+    return text.rstrip(".") + hint
 
 
 def _say(text: str, code: int) -> int:

@@ -126,14 +126,25 @@ def read_parameters(file: Path | None, chosen: Mapping[str, object]) -> dict[str
     if file is None:
         return dict(chosen)
     try:
-        values = json.loads(file.read_text(encoding="utf-8"))
+        values = json.loads(file.read_text(encoding="utf-8-sig"), object_pairs_hook=_once)
     except OSError as error:
         raise ParameterError(f"cannot read {file}: {error.strerror or error}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ParameterError(f"{file} is not JSON: {error}") from error
     if not isinstance(values, dict):
         raise ParameterError(f'{file}: wanted is a JSON object such as {{"patience": 2.0}}')
     return {**values, **chosen}
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """A JSON object whose keys are all different."""
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ParameterError(
+            f"{next(name for name in names if names.count(name) > 1)!r} stands twice in the parameter file"
+        )
+    return values
 
 
 def _option(declared: params.Parameter, owners: list[str]) -> inspect.Parameter:

@@ -24,6 +24,10 @@ class Ending:
         self.interrupted = False
         self._waiting = False
 
+    def at_once(self) -> None:
+        """From now on the first signal interrupts: what is under way may be thrown away."""
+        self._waiting = True
+
     @property
     def status(self) -> str:
         """'done', 'damaged' or 'interrupted'."""

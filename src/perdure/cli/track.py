@@ -20,6 +20,7 @@ from perdure.cli.film import draw_film, drawn_while_running
 from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
+from perdure.errors import OutputError
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
 from perdure.fold import Step
@@ -69,12 +70,12 @@ def track(
         classes=class_ or (),
         parameters=given,
     )
-    folder = RunFolder.create(output or Path("perdure-runs") / made.source.name, overwrite=overwrite)
+    place = output or Path("perdure-runs") / made.source.name
+    inputs = [Path(one) for one in (source, detector, roi, parameters) if one is not None]
+    folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
     outcome = run(made, folder, reporting, window=window, film=not no_video)
-    show(outcome, folder, as_json=json_, wants_film=not no_video)
-    if outcome.frames and not (no_video or outcome.has_film):
-        raise typer.Exit(130)  # interrupted while the film was drawn
+    show(outcome, folder, as_json=json_)
     if outcome.code:
         raise typer.Exit(outcome.code)
 
@@ -109,10 +110,33 @@ def run(
     """Run a plan into a folder: log, results, film; whatever happens, what was tracked so far is kept."""
     about = _about(made, reporting, window or {})
     folder.write_about({**about, "status": "running"})
-    begun = time.monotonic()
     counted = _Count()
+    try:
+        with Ending() as ending:
+            return _run(made, folder, reporting, about, film, ending, counted)
+    except BaseException:
+        if counted.frames:
+            with contextlib.suppress(OutputError):
+                folder.write_about({**about, "status": "failed", "frames": counted.frames})
+        else:
+            folder.discard()
+        raise
+    finally:
+        made.source.close()
+
+
+def _run(
+    made: Plan,
+    folder: RunFolder,
+    reporting: Reporting,
+    about: dict[str, Any],
+    film: bool,
+    ending: Ending,
+    counted: _Count,
+) -> Outcome:
+    begun = time.monotonic()
     live_film = film and not made.source.rereadable
-    with Ending() as ending, RunLog(folder.log) as log:
+    with RunLog(folder.log) as log:
         frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
         steps: Iterable[Step] = ending.first_look(made).steps(frames)
         if live_film:
@@ -121,26 +145,30 @@ def run(
             log.append(-1 if step.frame is None else step.frame.index, counted.time(step.frame), step.report)
     totals = folder.write_results(reporting)
     tracked = time.monotonic()
-    message, warnings = str(ending.damage or ""), (*made.source.warnings, *made.notes())
-    about |= {"frames": counted.frames, "message": message, "warnings": list(warnings)}
-    folder.write_about({**about, "status": ending.status, **dataclasses.asdict(totals)})
+    status, message = ending.status, str(ending.damage or "")
+    warnings = (*made.source.warnings, *made.notes())
+    about |= {"frames": counted.frames, "warnings": list(warnings), **dataclasses.asdict(totals)}
+    folder.write_about({**about, "status": status, "message": message})
     if film and not live_film and not ending.interrupted:
-        with contextlib.suppress(KeyboardInterrupt):
+        try:
+            ending.at_once()
             draw_film(made.source, made.scene, folder, counted.frames)
-    made.source.close()
+        except KeyboardInterrupt:
+            status, message = "interrupted", "the film is not finished, the tracks are; `perdure draw` draws it"
+            folder.write_about({**about, "status": status, "message": message})
     return Outcome(
         frames=counted.frames,
         totals=totals,
         seconds=tracked - begun,
         film_seconds=time.monotonic() - tracked if film and not live_film else 0.0,
-        status=ending.status,
+        status=status,
         message=message,
         warnings=warnings,
         has_film=folder.film.exists(),
     )
 
 
-def show(outcome: Outcome, folder: RunFolder, *, as_json: bool, wants_film: bool) -> None:
+def show(outcome: Outcome, folder: RunFolder, *, as_json: bool) -> None:
     """Print how the run ended; as one JSON object on the last line of stdout if asked."""
     for warning in outcome.warnings:
         print(f"perdure: note: {warning}", file=sys.stderr)
@@ -148,8 +176,6 @@ def show(outcome: Outcome, folder: RunFolder, *, as_json: bool, wants_film: bool
         print(f"perdure: {outcome.message}", file=sys.stderr)
     if outcome.status == "interrupted":
         print(f"perdure: interrupted; everything so far is in {folder.path}", file=sys.stderr)
-    elif wants_film and not outcome.has_film and outcome.frames:
-        print("perdure: the film is not finished; the tracks are. `perdure draw` draws it", file=sys.stderr)
     if as_json:
         value = {
             "status": outcome.status,

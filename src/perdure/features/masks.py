@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.types import Mask
+from perdure.types import Boxes, Mask
 
 
 def disjoint(masks: Sequence[Mask], height: int, width: int) -> tuple[Mask, ...]:
@@ -26,6 +26,13 @@ def disjoint(masks: Sequence[Mask], height: int, width: int) -> tuple[Mask, ...]
             mask if np.array_equal(bits, mask.bits) and _is_tight(bits) else Mask.of_image(bits, mask.y, mask.x)
         )
     return tuple(kept)
+
+
+def holding(boxes: Boxes, masks: Sequence[Mask]) -> Boxes:
+    """Return the boxes (N, 4), enlarged where a mask leaves its box."""
+    around = [mask.box if mask.area else tuple(box) for mask, box in zip(masks, boxes, strict=True)]
+    seen = np.array(around, np.float32).reshape(-1, 4)
+    return np.concatenate([np.minimum(boxes[:, :2], seen[:, :2]), np.maximum(boxes[:, 2:], seen[:, 2:])], axis=1)
 
 
 def run_lengths(mask: Mask) -> list[int]:

@@ -33,6 +33,7 @@ EVENT_COLUMNS = (
     "why",
 )
 PARTS = ("run.json", "tracks.jsonl", "tracks.txt", "events.csv", "tracked.mp4")
+_LEFTOVERS = {".DS_Store", *(f".{name}.part" for name in PARTS)}  # of a run that was killed
 
 
 @dataclass(frozen=True)
@@ -60,29 +61,53 @@ class RunFolder:
     path: Path
 
     @staticmethod
-    def create(path: Path, *, overwrite: bool) -> RunFolder:
+    def create(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> RunFolder:
         """Make the folder of a new run.
 
         Raises
         ------
         OutputError
-            If it holds a run and `overwrite` is not asked, or if it holds anything else.
+            If it holds a run and `overwrite` is not asked, if it holds anything else, or if one of the
+            run's `inputs` would be replaced.
         """
+        folder = RunFolder(path)
         try:
-            there = {one.name for one in path.iterdir()} if path.is_dir() else set()
             if path.exists() and not path.is_dir():
                 raise OutputError(f"{path} is a file; name a folder with -o")
-            if there - {".DS_Store"} and "run.json" not in there:
-                raise OutputError(f"{path} holds other files; name a new folder with -o")
-            if "run.json" in there and not overwrite:
-                of = RunFolder(path).read_about().get("source", "another source")
-                raise OutputError(f"{path} holds a run of {of}; add --overwrite, or name another folder with -o")
+            there = {one.name for one in path.iterdir()} if path.is_dir() else set()
+            folder._refuse_to_replace(there - _LEFTOVERS, overwrite=overwrite, inputs=inputs)
             path.mkdir(parents=True, exist_ok=True)
-            for name in PARTS:
-                (path / name).unlink(missing_ok=True)
+            folder.discard(keep_folder=True)
         except OSError as error:
             raise cannot_write(path, error) from error
-        return RunFolder(path)
+        return folder
+
+    def _refuse_to_replace(self, there: set[str], *, overwrite: bool, inputs: Iterable[Path]) -> None:
+        if there and "run.json" not in there:
+            raise OutputError(f"{self.path} holds other files ({min(there)}); name a new folder with -o")
+        if "run.json" in there and not overwrite:
+            try:
+                of = self.read_about().get("source", "another source")
+            except FormatError:
+                of = "something"
+            raise OutputError(f"{self.path} holds a run of {of}; add --overwrite, or name another folder with -o")
+        for part in PARTS:
+            place = self.path / part
+            if place.is_dir():
+                raise OutputError(
+                    f"{place} is a folder where a file of the run belongs; name another folder with -o"
+                )
+            if any(place.exists() and one.exists() and place.samefile(one) for one in inputs):
+                raise OutputError(
+                    f"{place} is needed for this run and would be replaced; name another folder with -o"
+                )
+
+    def discard(self, *, keep_folder: bool = False) -> None:
+        """Remove the run's files and leftovers, `run.json` last; and the folder, if nothing else is in it."""
+        for name in (*_LEFTOVERS, *reversed(PARTS)):
+            (self.path / name).unlink(missing_ok=True)
+        if not keep_folder and self.path.is_dir() and not any(self.path.iterdir()):
+            self.path.rmdir()
 
     @staticmethod
     def open(path: Path) -> RunFolder:
@@ -114,14 +139,29 @@ class RunFolder:
             file.write("\n")
 
     def read_about(self) -> dict[str, Any]:
-        """Return what `run.json` says; empty where it is missing."""
+        """Return what `run.json` says; empty where it is missing.
+
+        Raises
+        ------
+        FormatError
+            If it is damaged.
+        """
+        place = self.path / "run.json"
         try:
-            about = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
+            about = json.loads(place.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError) as error:
-            raise FormatError(f"cannot read {self.path / 'run.json'}: {error}") from error
-        return about if isinstance(about, dict) else {}
+        except (OSError, ValueError, RecursionError) as error:
+            raise FormatError(
+                f"{place} is damaged ({error}); `perdure track --overwrite` makes it anew"
+            ) from error
+        if not isinstance(about, dict) or any(
+            not isinstance(about.get(key, {}), dict) for key in ("window", "reporting")
+        ):
+            raise FormatError(
+                f"{place} is damaged: no description of a run; `perdure track --overwrite` makes it anew"
+            )
+        return about
 
     def settled_by_frame(self) -> Iterator[tuple[int, Tracks]]:
         """Yield (frame, settled rows), all statuses, groups too; memory stays bounded."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.boxes import centres, overlaps
-from perdure.features.masks import disjoint
+from perdure.features.masks import disjoint, holding
 from perdure.maths.assign import assign
 from perdure.params import parameter
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
@@ -106,16 +106,17 @@ class Overlap:
         """Return a row for every target; an unseen one is LOST, where it is expected, less and less surely."""
         hope = 1.0 - (frame.time - state.seen) / max(self.patience, 1e-6)
         seen = link >= 0
+        masks = disjoint([(*regions.masks, Mask.empty())[j] for j in link], *state.scene_size)
         return Tracks.of(
             frames=frame.index,
             times=frame.time,
             ids=state.ids,
-            boxes=_expected(state, frame.time),
+            boxes=holding(_expected(state, frame.time), masks),
             status=np.where(seen, Status.VISIBLE, Status.LOST),
             confidence=np.where(seen, np.append(regions.scores, 0)[link], np.clip(hope, 0.0, 1.0)),
             classes=np.append(regions.classes, "")[link],
             inferred=~seen,
-            masks=disjoint([(*regions.masks, Mask.empty())[j] for j in link], *state.scene_size),
+            masks=masks,
             links=[(int(j),) if j >= 0 else () for j in link],
         )
 

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from perdure.types.arrays import Boxes, as_boxes, check_lengths, frozen, row_index, same_columns
 from perdure.types.frame import Mask
 
+FARTHEST = 1e6  # px
+
 
 @dataclass(frozen=True, eq=False)
 class Regions:
@@ -44,6 +46,12 @@ class Regions:
         object.__setattr__(self, "masks", tuple(self.masks))
         check_lengths(len(self.boxes), {"scores": self.scores, "classes": self.classes, "masks": self.masks})
         check_lengths(len(self.boxes), self.data)
+        if not (self.boxes[:, :2] <= self.boxes[:, 2:]).all():
+            raise ValueError("a region's box must have x1 ≤ x2 and y1 ≤ y2")
+        if (np.abs(self.boxes) > FARTHEST).any():
+            raise ValueError(f"a region's box may reach {FARTHEST:g} pixels at most")
+        if not ((self.scores >= 0) & (self.scores <= 1)).all():
+            raise ValueError("a region's score must lie in [0, 1]")
 
     @staticmethod
     def of(
