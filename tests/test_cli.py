@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import functools
+import http.server
 import json
 import os
 import shlex
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -369,6 +372,26 @@ def test_a_failed_run_leaves_no_wreck(tmp_path: Path, monkeypatch: pytest.Monkey
         json.loads((tmp_path / "run/run.json").read_text())["status"] if (tmp_path / "run").exists() else "gone"
     )
     assert status in ("failed", "gone")
+
+
+def test_a_stream_is_tracked_and_drawn_while_it_comes(place: Path):
+    """A server on this machine; what comes from it cannot be read a second time."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None: ...
+
+    handler = functools.partial(Quiet, directory=str(place))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = f"http://127.0.0.1:{server.server_port}/walk.avi"
+        done = perdure("track", url, "-o", "streamed", "--json", at=place)
+        missing = perdure("track", url.replace("walk", "gone"), "-o", "y", at=place)
+        server.shutdown()
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout.splitlines()[-1])["tracks"] == 2
+    with av.open(str(place / "streamed/tracked.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == 40
+    assert (missing.returncode, "404" in missing.stderr, (place / "y").exists()) == (2, True, False)
 
 
 def test_help_tells_meaning_range_and_default_of_every_parameter():

@@ -141,7 +141,7 @@ def _unpack(tree: Any, kind: Any, arrays: list[NDArray[Any]]) -> Any:
         if tree is None:
             return None
         return _unpack(tree, next(one for one in arguments if one is not type(None)), arrays)
-    if kind is np.ndarray or origin is np.ndarray:
+    if _is_array(kind):
         return dict(enumerate(arrays))[tree["array"]]
     if origin is tuple:
         if isinstance(arguments[-1], types.EllipsisType):
@@ -152,6 +152,12 @@ def _unpack(tree: Any, kind: Any, arrays: list[NDArray[Any]]) -> Any:
     if isinstance(kind, type):
         return _unpack_plain(tree, kind, arrays)
     raise StateError(f"a state cannot declare {kind}")
+
+
+def _is_array(kind: Any) -> bool:
+    """Whether a declared type is an array, also by an alias such as `NDArray` (a `type` statement in newer NumPy)."""
+    origin = get_origin(kind) or kind
+    return origin is np.ndarray or (hasattr(origin, "__value__") and _is_array(origin.__value__))
 
 
 def _unpack_plain(tree: Any, kind: type, arrays: list[NDArray[Any]]) -> Any:

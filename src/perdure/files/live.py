@@ -16,6 +16,7 @@ from perdure.errors import VideoError
 from perdure.files.clock import Clock
 from perdure.files.decoding import rgb
 from perdure.files.passing import Passing, Shot, passing
+from perdure.files.refusal import TOLERANT
 from perdure.files.span import Span
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 _PATIENCE = 10.0  # s without an answer
 _RATE = 25.0
+_NO_SEEKING = "; if it is an mp4, its index may be at its end: download it first"
 
 
 def open_url(url: str, fps: float | None, span: Span) -> Passing:
@@ -30,7 +32,7 @@ def open_url(url: str, fps: float | None, span: Span) -> Passing:
     shown = _without_password(url)
     options = {"rtsp_transport": "tcp"} if url.lower().startswith("rtsp") else {}
     try:
-        container = av.open(url, options=options, timeout=_PATIENCE, metadata_errors="replace")
+        container = av.open(url, options=options, timeout=_PATIENCE, **TOLERANT)
     except (av.error.FFmpegError, OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise VideoError(f"{shown} cannot be reached ({why}); check the address and the network") from None
@@ -91,6 +93,7 @@ def _camera_shots(camera: cv2.VideoCapture) -> Iterator[Shot]:
 def _stream_shots(container: av.container.InputContainer, stream: av.VideoStream) -> Iterator[Shot]:
     """Pictures of a stream; damaged ones are left out."""
     tick = float(stream.time_base or 0)
+    hint = _NO_SEEKING if "mp4" in container.format.name else ""
     try:
         for packet in container.demux(stream):
             try:
@@ -101,8 +104,9 @@ def _stream_shots(container: av.container.InputContainer, stream: av.VideoStream
                 if isinstance(frame, av.VideoFrame) and not frame.is_corrupt:
                     seconds = None if frame.pts is None else frame.pts * tick
                     yield Shot(rgb(frame), seconds)
+                    hint = ""  # what gave a picture can be read in its order
     except av.error.FFmpegError as error:
-        raise VideoError(f"the connection was lost ({error.strerror or error})") from None
+        raise VideoError(f"the connection was lost ({error.strerror or error}){hint}") from None
 
 
 def _without_password(url: str) -> str:

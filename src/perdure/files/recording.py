@@ -18,7 +18,7 @@ from perdure.files.ahead import ahead
 from perdure.files.clock import Clock
 from perdure.files.decoding import Broken, Listing, Picture, can_enter, decode, list_frames, rgb
 from perdure.files.refusal import opened, video_stream
-from perdure.files.span import Span
+from perdure.files.span import Span, no_frame
 from perdure.types import Bits, Frame, Image, Scene
 
 _RATE = 25.0  # frames per second, where a file says none
@@ -193,8 +193,7 @@ def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
     with opened(path) as container:
         stream = video_stream(path, container)
         rate = _rate(stream, warnings)
-        length = (container.duration or 0) / av.time_base
-    total = stream.frames or round(length * rate) or None
+        total = stream.frames or round((container.duration or 0) / av.time_base * rate) or None
     first = first_picture(path)
     turns = round(first.frame.rotation / 90) % 4
     if turns:
@@ -210,7 +209,7 @@ def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
             own = (listing.stamps[-1] - listing.stamps[0]) * listing.tick + 1 / rate
             raise VideoError(too_late(span, path, len(listing.stamps) / fps if fps else own))
         if not wanted:
-            raise ParameterError(f"start ({span.start or 0}) must lie before end ({span.end})")
+            raise ParameterError(no_frame(span))
     return Recording(
         name=path.stem,
         origin=str(path.resolve()),

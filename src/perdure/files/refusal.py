@@ -5,13 +5,16 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import av
 from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from perdure.errors import VideoError
+
+# Names and titles that are not UTF-8 are no reason to refuse a film; from version 19 on, av sees to that itself.
+TOLERANT: dict[str, Any] = {"metadata_errors": "replace"} if int(av.__version__.split(".")[0]) < 19 else {}
 
 _TEXT_ART = {"tty", "lrc", "srt", "webvtt", "ass"}  # formats that FFmpeg reads out of text files
 
@@ -29,7 +32,7 @@ def opened(path: Path) -> Iterator[InputContainer]:
     with path.open("rb") as file:
         head = file.read(4096)
     try:
-        container = av.open(str(path), metadata_errors="replace")
+        container = av.open(str(path), **TOLERANT)
     except av.error.FFmpegError as error:
         raise VideoError(_why_not(path, head, error)) from None
     with container:
