@@ -43,7 +43,15 @@ def test_scores_beyond_one_are_brought_into_range(tmp_path: Path):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("1,-1,a,1,9,9,1", "could not convert"),
+        ("1,-1,a,1,9,9,1", "'a' is no number"),
+        ("1,,1,1,9,9,1", "cell 2 is empty"),
+        ("1,-1,1, ,9,9,1", "cell 4 is empty"),
+        ("1,-1,1,1,9,9,,", "cell 7 is empty"),
+        (",1,-1,1,1,9,9", "cell 1 is empty"),
+        ("1,-1,1 1,9,9,1", "'1 1' is no number"),
+        ("1e300,-1,1,1,9,9,1", "frame 1e\\+300"),
+        ("1,-1,9e5,1,9e5,9,1", "cannot be"),
+        ("1,-1,1,1,9,9,1e300", "cannot be"),
         ("1,-1,1,1,9", "is not frame, id"),
         ("0,-1,1,1,9,9,1", "frame 0"),
         ("1.5,-1,1,1,9,9,1", "frame 1.5"),
@@ -62,3 +70,13 @@ def test_a_line_that_is_no_box_is_named(tmp_path: Path, line: str, said: str):
 def test_an_empty_file_holds_no_detections(tmp_path: Path):
     (tmp_path / "det.txt").write_text("")
     assert read_detections(tmp_path / "det.txt") == {}
+
+
+def test_one_comma_may_end_a_line(tmp_path: Path):
+    (tmp_path / "det.txt").write_text("1,-1,1,1,10,20,0.5,\n1, -1, 11, 1, 10, 20, 0.5\n")
+    assert read_detections(tmp_path / "det.txt")[0].boxes.tolist() == [[0, 0, 10, 20], [10, 0, 20, 20]]
+
+
+def test_blanks_may_stand_for_commas(tmp_path: Path):
+    (tmp_path / "det.txt").write_text("1 -1 1 1 10  20\n1\t-1 11 1 10 20\n")
+    assert read_detections(tmp_path / "det.txt")[0].boxes.tolist() == [[0, 0, 10, 20], [10, 0, 20, 20]]

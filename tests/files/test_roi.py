@@ -111,6 +111,14 @@ def test_a_text_file_holds_a_polygon_a_line(tmp_path: Path) -> None:
         ("roi.json", '{"type": "Polygon", "coordinates": [[[1, 2]]]}', "not GeoJSON"),
         ("roi.json", "[1, 2]", "not GeoJSON"),
         ("roi.json", '{"type": "FeatureCollection", "features": []}', "no polygon"),
+        ("roi.json", "[" * 100_000, "not JSON"),
+        ("roi.json", '{"type": "Feature", "geometry": ' * 100_000, "not JSON"),
+        ("roi.json", '{"type": "Feature", "geometry": ' * 800 + "{}" + "}" * 800, "not GeoJSON"),
+        ("roi.json", f'{{"type": "Polygon", "coordinates": [[[{"1" * 5000}, 1], [1, 2], [2, 2]]]}}', "not JSON"),
+        ("roi.json", f'{{"type": "Polygon", "coordinates": [[[{"1" * 400}, 1], [1, 2], [2, 2]]]}}', "1000000"),
+        ("roi.json", '{"type": "Polygon", "coordinates": [[["12", "13"], [1, 2], [2, 2]]]}', "not GeoJSON"),
+        ("roi.json", '{"type": "Polygon", "coordinates": 5}', "not GeoJSON"),
+        ("roi.txt", f"{'1' * 400},1 1,2 2,2", "1000000"),
     ],
 )
 def test_a_file_that_is_no_region_is_refused_in_one_line(
@@ -126,6 +134,33 @@ def test_a_file_that_is_no_region_is_refused_in_one_line(
 def test_a_text_that_is_no_region_is_refused(text: str) -> None:
     with pytest.raises(ParameterError):
         read_roi(text, 6, 4)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "x" * 300,
+        "y/" * 3000,
+        "1" * 400 + ",1,2,3",
+        "1" * 5000 + ",1 1,2 2,2",
+        "a\nb",
+        "a\0b",
+        5,
+        None,
+        b"1,1,2,2",
+        [1],
+    ],
+)
+def test_whatever_is_given_for_a_region_is_refused_in_one_short_line(given: object) -> None:
+    with pytest.raises(ParameterError) as refused:
+        read_roi(given, 6, 4)  # type: ignore[arg-type]
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 250
+
+
+def test_a_long_polygon_with_a_slip_at_its_end_is_refused_at_once() -> None:
+    with pytest.raises(ParameterError, match="no region"):
+        read_roi(" ".join(["1000,1000"] * 100) + " 5;5", 6, 4)
 
 
 def test_a_black_image_is_no_region(tmp_path: Path) -> None:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import http.server
 import itertools
 import os
+import re
 import threading
 from collections.abc import Iterator
 from fractions import Fraction
@@ -227,13 +231,59 @@ def test_a_start_is_included_and_an_end_is_not(
         {"stride": 0},
         {"fps": 0.0},
         {"fps": float("inf")},
+        {"fps": True},
+        {"fps": 0.0005},
+        {"fps": 1001},
+        {"fps": 10**400},
+        {"fps": 10**5000},
+        {"fps": "25"},
+        {"fps": ""},
+        {"fps": [25]},
+        {"fps": np.array([25.0])},
+        {"fps": 25j},
+        {"start": True},
+        {"end": False},
+        {"start": [1]},
+        {"start": 10**400},
+        {"start": 1e308},
+        {"start": "1" * 5000},
+        {"start": "1" * 5000 + "f"},
+        {"end": "1" * 5000 + ":00"},
+        {"start": "1\n2"},
+        {"stride": True},
+        {"stride": 2.0},
+        {"stride": "2"},
+        {"stride": -(10**5000)},
     ],
 )
 def test_a_part_that_cannot_be_is_refused(tmp_path: Path, wrong: dict[str, object]) -> None:
     path = film(tmp_path / "a.mp4")
-    with pytest.raises(ParameterError) as refused:
+    with pytest.raises(
+        ParameterError, match=f"^{next(iter(wrong))} |start .* must lie before end|no frame lies between"
+    ) as refused:
         open_source(path, **wrong)  # type: ignore[arg-type]
     assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 250
+
+
+def test_a_rate_out_of_range_is_told_the_range() -> None:
+    with pytest.raises(ParameterError, match=r"fps = 0 is out of range: it must be 0\.001 to 1000 frames/s"):
+        open_source([picture(0)], fps=0)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    source = open_source([picture(0)] * 9, fps=np.float32(12.5), start=np.int64(0), stride=np.int64(3))  # type: ignore[arg-type]
+    assert (source.fps, type(source.fps), numbers(source)) == (12.5, float, [0, 3, 6])
+    assert open_source([picture(0)], fps=Fraction(30000, 1001)).fps == pytest.approx(30 / 1.001)  # type: ignore[arg-type]
+
+
+def test_a_part_between_two_frames_says_that_none_lies_in_it(tmp_path: Path) -> None:
+    for source in (film(tmp_path / "a.mp4"), pngs(tmp_path / "frames", ["1.png", "2.png"])):
+        with pytest.raises(ParameterError, match=r"no frame lies between start \(0\.01 s\) and end \(0\.02 s\)"):
+            open_source(source, start=0.01, end=0.02)
+        for end, said in ((0, "0"), ("0f", "0f"), ("1e-7", "1e-07"), ("0:00", "0")):
+            with pytest.raises(ParameterError, match=rf"^end = {said} leaves no frame"):
+                open_source(source, end=1e-7 if end == "1e-7" else end)
 
 
 def test_a_start_beyond_the_end_says_how_long_the_film_is(tmp_path: Path) -> None:
@@ -326,6 +376,20 @@ def test_sixteen_bits_are_scaled_alike_in_every_frame(tmp_path: Path) -> None:
     assert "divided by 16" in source.warnings[0]
 
 
+@pytest.mark.parametrize(("first", "then"), [(np.uint8, np.uint16), (np.uint16, np.uint8)])
+def test_images_that_change_their_depth_end_the_source_and_are_not_shown_white(
+    tmp_path: Path, first: type, then: type
+) -> None:
+    for index in range(5):
+        cv2.imwrite(str(tmp_path / f"{index}.png"), np.full((6, 8), 90, first if index < 3 else then))
+    frames, damage = read_until_damage(open_source(tmp_path, fps=10))
+    assert [int(np.asarray(frame.image)[0, 0, 0]) for frame in frames] == [90, 90, 90]
+    assert damage is not None
+    assert damage.index == 3
+    assert "3.png" in str(damage)
+    assert "16 bits" in str(damage)
+
+
 @pytest.mark.parametrize("fault", ["size", "cut", "byte", "text", "gone"])
 def test_an_image_that_does_not_fit_ends_the_source_where_it_stands(tmp_path: Path, fault: str) -> None:
     folder = pngs(tmp_path, [f"{i}.png" for i in range(5)])
@@ -391,6 +455,41 @@ def test_a_sequence_badly_described_is_refused(tmp_path: Path, text: str) -> Non
         open_source(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("frameRate=20", "frameRate=0", "frameRate = 0 is out of range: it must be 0.001 to 1000"),
+        ("frameRate=20", "frameRate=1e300", "frameRate = 1e300 is out of range: it must be 0.001 to 1000"),
+        ("frameRate=20", "frameRate=nan", "frameRate = nan is out of range: it must be 0.001 to 1000"),
+        ("frameRate=20", "frameRate=fast", "frameRate = fast is out of range: it must be a number, 0.001 to 1000"),
+        ("frameRate=20\n", "", "the key frameRate is missing in [Sequence]"),
+        (
+            "seqLength=3",
+            "seqLength=-3",
+            "seqLength = -3 is out of range: it must be a whole number, 0 to 100000000",
+        ),
+        ("seqLength=3", "seqLength=3.5", "seqLength = 3.5 is out of range"),
+        ("seqLength=3", "seqLength=" + "9" * 5000, "seqLength = 9999"),
+        ("imWidth=8", "imWidth=0", "imWidth = 0 is out of range: it must be a whole number, 1 to 16384"),
+        ("imHeight=6", "imHeight=16385", "imHeight = 16385 is out of range"),
+        ("[Sequence]", "[Sequenz]", "the section [Sequence] is missing"),
+        ("[Sequence]\n", "", "line 1: it stands in no section; the first must be [Sequence]"),
+        ("imWidth=8", "imWidth", "line 6: not 'key = value'"),
+        ("imWidth=8", "imWidth=8\nimWidth=9", "line 7: it is given twice"),
+        ("imDir=img1", "imDir=" + "x" * 5000, "imDir"),
+    ],
+)
+def test_a_sequence_badly_described_is_told_key_value_and_range(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    (tmp_path / "seqinfo.ini").write_text(SEQINFO.replace(old, new))
+    with pytest.raises(FormatError, match=re.escape(said)) as refused:
+        open_source(tmp_path)
+    assert "seqinfo.ini" in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 300
+
+
 # ---- arrays -------------------------------------------------------------------------------------------
 
 
@@ -432,6 +531,38 @@ def test_an_array_of_another_size_ends_the_source() -> None:
 def test_what_is_no_source_is_refused(wrong: object) -> None:
     with pytest.raises((ParameterError, VideoError)):
         open_source(wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"a.mp4": 1}, "a dict is no source: give a file, a folder, "),
+        ({1, 2}, "a set is no source"),
+        (b"a.mp4", "bytes is no source"),
+        (bytearray(b"a.mp4"), "a bytearray is no source"),
+        (True, "true is no source"),
+        (3.5, "3.5 is no source"),
+        (np.zeros((6, 8, 3), np.uint8), r"one picture is no film; give \[picture\] or an array \(N, H, W, 3\)"),
+        (np.zeros((6, 8), np.uint8), "one picture is no film"),
+        (np.zeros((2, 6, 8, 3, 1), np.uint8), r"must be \(N, H, W, 3\)"),
+        (["1.png", "2.png"], "give the folder or a glob"),
+        ([Path("1.png")], "give the folder or a glob"),
+        (iter([Path("1.png")]), "give the folder or a glob"),
+        ([np.zeros((0, 5, 3), np.uint8)], "no pixels"),
+        (np.zeros((3, 4, 0), np.uint8), "no pixels"),
+        (iter([np.zeros((4, 0), np.uint8)]), "no pixels"),
+        ([[[1, 2], [3]]], r"\(H, W, 3\) or \(H, W\) uint8"),
+    ],
+)
+def test_what_is_no_film_is_told_what_would_be(wrong: object, said: str) -> None:
+    with pytest.raises((ParameterError, VideoError), match=said) as refused:
+        open_source(wrong)  # type: ignore[arg-type]
+    assert "\n" not in str(refused.value)
+
+
+def test_a_stack_of_grey_pictures_is_a_film() -> None:
+    source = open_source(np.zeros((7, 4, 5), np.uint8), fps=5)
+    assert (source.count, source.width, source.height) == (7, 5, 4)
 
 
 # ---- what cannot be opened ----------------------------------------------------------------------------
@@ -534,10 +665,85 @@ def test_a_film_that_may_not_be_read_says_so(tmp_path: Path) -> None:
         open_source(path)
 
 
+def test_a_folder_of_boxes_alone_is_told_what_makes_it_a_sequence(tmp_path: Path) -> None:
+    (tmp_path / "det").mkdir()
+    with pytest.raises(VideoError, match=r"and no seqinfo\.ini, so it is no MOTChallenge folder"):
+        open_source(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "x" * 300,
+        "y/" * 3000,
+        "x" * 300 + "*",
+        "1" * 5000,
+        "a\nb",
+        "a\0b",
+        "a\0*",
+        pytest.param(10**5000, id="huge"),
+        -1,
+    ],
+)
+def test_a_name_that_no_file_can_have_is_refused_in_one_short_line(name: str | int) -> None:
+    with pytest.raises(VideoError) as refused:
+        open_source(name)
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 300
+
+
+def test_a_device_is_no_regular_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.png")
+    for place in ("/dev/zero", "/dev/null", tmp_path / "pipe.png"):
+        with pytest.raises(VideoError, match="is no regular file"):
+            open_source(place)
+
+
 def test_a_camera_that_is_not_there_says_so() -> None:
     for number in (987, "987"):
         with pytest.raises(VideoError, match="camera 987"):
             open_source(number)
+
+
+def test_an_mp4_with_its_index_at_the_end_on_a_server_that_cannot_seek_says_what_would_do(tmp_path: Path) -> None:
+    film(tmp_path / "a.mp4", 200, gop=1).rename(tmp_path / "front.mp4")
+    with av.open(str(tmp_path / "front.mp4")) as front, av.open(str(tmp_path / "a.mp4"), "w") as back:
+        stream = back.add_stream_from_template(front.streams.video[0])
+        for packet in front.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                back.mux(packet)
+    with (
+        _served(tmp_path) as address,
+        pytest.raises(VideoError, match="its index may be at its end: download it first"),
+    ):
+        open_source(f"{address}/a.mp4")
+
+
+@contextlib.contextmanager
+def _served(folder: Path) -> Iterator[str]:
+    """A server of this machine that cannot seek."""
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = http.server.HTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder)))
+    server.handle_error = lambda *_: None  # type: ignore[method-assign]
+    serving = threading.Thread(target=server.serve_forever, args=(0.02,))
+    serving.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        serving.join()
+        server.server_close()
+
+
+def test_an_address_that_is_none_says_so_without_the_password() -> None:
+    with pytest.raises(VideoError, match="the URL cannot be read") as refused:
+        open_source("rtsp://guest:secret@[street")
+    assert "secret" not in str(refused.value)
 
 
 def test_an_address_that_does_not_answer_says_so_without_the_password() -> None:

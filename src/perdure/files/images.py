@@ -1,7 +1,8 @@
 """Folders and globs of images, and MOTChallenge folders with or without their images.
 
 Images come in the order of the numbers in their names. Grey ones become RGB, transparency is dropped, and
-16-bit values are divided by one power of two for the whole folder, found from a sample of its images.
+16-bit values are divided by one power of two for the whole folder, found from a sample of its images;
+where the depth changes on the way, the source breaks off.
 A JPEG or PNG that ends early is refused, a PNG with any changed byte also; a JPEG with changed bytes
 decodes to a changed picture, which nothing tells.
 """
@@ -14,21 +15,22 @@ import os
 import re
 import zlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError, VideoError
 from perdure.files.numbered import Numbered
-from perdure.files.span import Span
+from perdure.files.span import Span, cut
 from perdure.types import Image
 
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".jp2"})
 _FILMS = frozenset({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv"})
+_N = TypeVar("_N", int, float)
 _Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 _RATE = 25.0
 _NO_RATE = "images say no frame rate: 25 per second are taken; give fps for the true one"
@@ -52,7 +54,7 @@ def open_glob(pattern: str, fps: float | None, span: Span) -> Numbered:
     paths = sorted((Path(one) for one in glob.glob(pattern, recursive=True)), key=natural_order)
     paths = [one for one in paths if one.is_file()]
     if not paths:
-        raise VideoError(f"nothing matches {pattern}")
+        raise VideoError(f"nothing matches {cut(pattern, 250)}")
     name = paths[0].resolve().parent.name
     return _open_images(paths, name, str(Path(pattern).absolute()), fps, span, [])
 
@@ -102,12 +104,20 @@ class _Reader:
     """Reads the images of a folder as 8-bit RGB, 16-bit values divided by 2 ** shift."""
 
     paths: Sequence[Path]
+    depth: int  # bits: 8 or 16
     shift: int = 0
 
     def __call__(self, index: int) -> Image:
         pixels = read_pixels(self.paths[index])
-        shifted = pixels >> self.shift if pixels.dtype == np.uint16 else pixels
-        return np.minimum(shifted, 255).astype(np.uint8, copy=False)
+        depth = _depth(pixels)
+        if depth != self.depth:
+            raise VideoError(f"it has {depth} bits a channel, the first image has {self.depth} bits")
+        narrow = np.minimum(pixels >> self.shift, 255) if depth == 16 else pixels
+        return narrow.astype(np.uint8, copy=False)
+
+
+def _depth(pixels: _Pixels) -> int:
+    return 8 * pixels.dtype.itemsize
 
 
 def _open_images(
@@ -115,7 +125,7 @@ def _open_images(
 ) -> Numbered:
     first = read_pixels(paths[0])
     height, width = first.shape[:2]
-    reader = _Reader(paths, _shift_of(paths, warnings) if first.dtype == np.uint16 else 0)
+    reader = _Reader(paths, _depth(first), _shift_of(paths, warnings) if _depth(first) == 16 else 0)
     return Numbered(
         name,
         origin,
@@ -161,24 +171,54 @@ class _Told:
 
 
 def _read_seqinfo(path: Path) -> _Told:
+    """Read what a seqinfo.ini says; FormatError names key, value and range."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(path.read_text(encoding="utf-8-sig"), str(path))
-        told = parser["Sequence"]
-        result = _Told(
-            told.get("imDir", "img1"),
-            float(told["frameRate"]),
-            int(told["seqLength"]),
-            int(told["imWidth"]),
-            int(told["imHeight"]),
-        )
-    except KeyError as error:
-        raise FormatError(f"{path}: {error.args[0]!r} is missing") from None
-    except (configparser.Error, ValueError) as error:
-        raise FormatError(f"{path}: {' '.join(str(error).split())}") from None
-    if not 0 < result.rate < float("inf") or min(result.length, result.width, result.height) < 0:
-        raise FormatError(f"{path}: frameRate must be > 0, seqLength, imWidth and imHeight not below 0")
-    return result
+    except (configparser.Error, UnicodeDecodeError) as error:
+        raise FormatError(f"{path}{_fault(error)}") from None
+    if not parser.has_section("Sequence"):
+        raise FormatError(f"{path}: the section [Sequence] is missing")
+    told = parser["Sequence"]
+    images = told.get("imDir", "img1")
+    if len(images) > 255 or not images.isprintable():
+        raise FormatError(f"{path}: imDir = {cut(images)} is no name of a folder")
+    return _Told(
+        images,
+        _number(path, told, "frameRate", float, 0.001, 1000),
+        _number(path, told, "seqLength", int, 0, 10**8),
+        _number(path, told, "imWidth", int, 1, 16384),
+        _number(path, told, "imHeight", int, 1, 16384),
+    )
+
+
+def _number(
+    path: Path, told: Mapping[str, str], key: str, kind: Callable[[str], _N], low: float, high: float
+) -> _N:
+    """The value of a key, in its range."""
+    text = told.get(key)
+    if text is None:
+        raise FormatError(f"{path}: the key {key} is missing in [Sequence]")
+    try:
+        value = kind(text)
+        if low <= value <= high:
+            return value
+        what = ""
+    except ValueError:
+        what = "a number, "
+    what = "a whole number, " if kind is int else what
+    raise FormatError(f"{path}: {key} = {cut(text)} is out of range: it must be {what}{low} to {high}")
+
+
+def _fault(error: configparser.Error | UnicodeDecodeError) -> str:
+    """Where a seqinfo.ini cannot be read, and why."""
+    if isinstance(error, configparser.MissingSectionHeaderError):
+        return f", line {error.lineno}: it stands in no section; the first must be [Sequence]"
+    if isinstance(error, configparser.ParsingError):
+        return f", line {error.errors[0][0]}: not 'key = value'"
+    if isinstance(error, (configparser.DuplicateOptionError, configparser.DuplicateSectionError)):
+        return f", line {error.lineno}: it is given twice"
+    return ": it is not text"
 
 
 def _images_in(folder: Path) -> tuple[list[Path], list[str]]:
@@ -205,7 +245,10 @@ def _nothing_in(folder: Path) -> str:
     below = [one.name for one in _folders_of_images(folder)]
     if below:
         return f"{folder} holds no images itself; did you mean its folder {' or '.join(below[:5])}?"
-    return f"{folder} holds no images ({', '.join(sorted(SUFFIXES))})"
+    nothing = f"{folder} holds no images ({', '.join(sorted(SUFFIXES))})"
+    if any((folder / one).is_dir() for one in ("det", "gt")):
+        return f"{nothing} and no seqinfo.ini, so it is no MOTChallenge folder"
+    return nothing
 
 
 def _folders_of_images(folder: Path) -> list[Path]:

@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from perdure.errors import FormatError
 from perdure.features.masks import of_run_lengths, run_lengths
+from perdure.files.span import shown
 from perdure.types import Mask
 
 Json = Any
+_LONGEST_SIDE, _LARGEST_AREA = 1 << 15, 1 << 28  # px, of a silhouette
+_FAR = 10**6  # px
 
 
 class Line(NamedTuple):
@@ -57,10 +60,13 @@ def read_lines(path: Path, kind: str, version: int) -> Iterator[Line]:
 
 
 def line_at(path: Path, number: int, offset: int) -> Line:
-    """Return the line that begins at a byte that `read_lines` gave."""
-    with path.open("rb") as file:
-        file.seek(offset)
-        return Line(number, offset, _parse(path, number, file.readline()))
+    """Return the line that begins at a byte that `read_lines` gave; FormatError if it is there no more."""
+    try:
+        with path.open("rb") as file:
+            file.seek(offset)
+            return Line(number, offset, _parse(path, number, file.readline()))
+    except OSError as error:
+        raise FormatError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def check_header(path: Path, header: Mapping[str, Json], kind: str, version: int) -> None:
@@ -68,7 +74,9 @@ def check_header(path: Path, header: Mapping[str, Json], kind: str, version: int
     if header.get("format") != kind:
         raise FormatError(f"{path} is not a {kind} file (its first line does not say so)")
     if header.get("version") != version:
-        raise FormatError(f"{path} has version {header.get('version')}; this Perdure reads version {version}")
+        raise FormatError(
+            f"{path} has version {shown(header.get('version'))}; this Perdure reads version {version}"
+        )
 
 
 def mask_to_json(mask: Mask) -> Json:
@@ -77,11 +85,27 @@ def mask_to_json(mask: Mask) -> Json:
 
 
 def mask_of_json(value: Json) -> Mask:
-    """Return the silhouette that `mask_to_json` wrote; ValueError, KeyError or TypeError if it is damaged."""
-    height, width = (int(one) for one in value["size"])
-    if height < 0 or width < 0:
-        raise ValueError("a mask of negative size")
-    return of_run_lengths(value["runs"], int(value["y"]), int(value["x"]), height, width)
+    """Return the silhouette that `mask_to_json` wrote; ValueError if it is damaged, before it takes room."""
+    if not isinstance(value, Mapping) or not {"x", "y", "size", "runs"} <= value.keys():
+        raise ValueError("a mask must have x, y, size and runs")
+    size, runs, corner = value["size"], value["runs"], (value["y"], value["x"])
+    if not _are_whole(size) or len(size) != 2 or not all(0 <= side <= _LONGEST_SIDE for side in size):
+        raise ValueError(f"a mask's size must be [height, width], each a whole number up to {_LONGEST_SIDE}")
+    if not _are_whole(list(corner)) or max(map(abs, corner)) > _FAR:
+        raise ValueError(f"a mask's x and y must be whole numbers up to {_FAR}")
+    if not _are_whole(runs) or min(runs, default=0) < 0:
+        raise ValueError("a mask's runs must be whole numbers from 0 on")
+    height, width = size
+    if height * width > _LARGEST_AREA:
+        raise ValueError(f"a mask may have {_LARGEST_AREA} pixels at most, not {width}x{height}")
+    if sum(runs) != height * width:
+        raise ValueError(f"the mask's runs do not fill its size of {width}x{height}")
+    return of_run_lengths(runs, *corner, height, width)
+
+
+def _are_whole(values: Json) -> bool:
+    """Whether this is a list of whole numbers and of nothing else, not even of yes and no."""
+    return isinstance(values, list) and set(map(type, values)) <= {int}
 
 
 def short(value: np.float32 | float) -> float:
@@ -94,11 +118,20 @@ def short_row(values: NDArray[np.float32]) -> list[float]:
     return [short(value) for value in values]
 
 
+def why_not_json(error: ValueError | RecursionError) -> str:
+    """Return in a few words why a text is not JSON that can be read."""
+    if isinstance(error, json.JSONDecodeError):
+        return error.msg
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not text"
+    return "it is nested too deep" if isinstance(error, RecursionError) else "a number in it has too many digits"
+
+
 def _parse(path: Path, number: int, raw: bytes) -> Mapping[str, Json]:
     try:
         value = json.loads(raw)
     except (ValueError, RecursionError) as error:
-        raise FormatError(f"{path}, line {number}: not JSON ({error})") from error
+        raise FormatError(f"{path}, line {number}: not JSON ({why_not_json(error)})") from error
     if not isinstance(value, Mapping):
         raise FormatError(f"{path}, line {number}: not a JSON object")
     return value

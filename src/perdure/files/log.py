@@ -66,7 +66,7 @@ def read_log(path: Path, *, with_masks: bool = True) -> Iterator[Entry]:
         try:
             entry = Entry(int(value["frame"]), float(value["time"]), report_of_json(value, with_masks))
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
-            raise FormatError(f"{path}, line {number}: not a report ({error!r})") from error
+            raise FormatError(f"{path}, line {number}: not a report ({error})") from error
         yield entry
 
 

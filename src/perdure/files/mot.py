@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError
+from perdure.files.span import shown
 from perdure.types import Regions, Tracks
+from perdure.types.regions import FARTHEST
 
 
 def write_rows(file: IO[str], rows: Tracks) -> None:
@@ -90,24 +92,41 @@ def read_table(path: Path) -> NDArray[np.float64]:
 
 
 def _row(path: Path, number: int, line: str) -> list[float]:
-    words = line.replace(",", " ").split()
-    try:
-        row = [float(word) for word in words]
-    except ValueError as error:
-        raise FormatError(
-            f"{path}, line {number}: {error}; wanted are numbers: frame, id, left, top, …"
-        ) from error
+    row = [_number(path, number, word) for word in _cells(path, number, line)]
     if len(row) < 6 or not np.isfinite(row).all():
         raise FormatError(
-            f"{path}, line {number}: {line.strip()[:60]!r} is not frame, id, left, top, width, height"
+            f"{path}, line {number}: {shown(line.strip())} is not frame, id, left, top, width, height"
         )
-    if row[0] < 1 or row[0] != int(row[0]):
-        raise FormatError(f"{path}, line {number}: frame {row[0]:g} is not a whole number from 1 on")
-    if row[4] < 0 or row[5] < 0 or max(abs(one) for one in row[2:6]) > _FAR:
-        raise FormatError(
-            f"{path}, line {number}: a box of {row[4]:g}x{row[5]:g} at ({row[2]:g}, {row[3]:g}) cannot be"
-        )
+    if not 1 <= row[0] <= _LAST or row[0] != int(row[0]):
+        raise FormatError(f"{path}, line {number}: frame {row[0]:g} is not a whole number from 1 to {_LAST}")
+    left, top, width, height = row[2:6]
+    reach = max(abs(one - 1) for one in (left, top, left + width, top + height))
+    if min(width, height) < 0 or reach > FARTHEST:
+        raise FormatError(f"{path}, line {number}: a box of {width:g}x{height:g} at ({left:g}, {top:g}) cannot be")
+    if max(abs(one) for one in row[6:7] or [0]) > _SUREST:
+        raise FormatError(f"{path}, line {number}: a confidence of {row[6]:g} cannot be")
     return row
+
+
+def _cells(path: Path, number: int, line: str) -> list[str]:
+    """The words of a line: between commas, one of which may end it, or else between blanks."""
+    if "," not in line:
+        return line.split()
+    cells = [cell.strip() for cell in line.strip().removesuffix(",").split(",")]
+    if "" in cells:
+        raise FormatError(
+            f"{path}, line {number}: cell {cells.index('') + 1} is empty; give a number, -1 for none"
+        )
+    return cells
+
+
+def _number(path: Path, number: int, word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise FormatError(
+            f"{path}, line {number}: {shown(word)} is no number; wanted are frame, id, left, top, …"
+        ) from None
 
 
 def _boxes(table: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -115,4 +134,5 @@ def _boxes(table: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.concatenate([corner, corner + table[:, 4:6]], axis=1).astype(np.float32)
 
 
-_FAR = 1e6  # px
+_LAST = 10**9  # frame
+_SUREST = 1e30  # beyond which a span of scores might not be a number

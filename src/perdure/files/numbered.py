@@ -11,7 +11,7 @@ import numpy as np
 
 from perdure.errors import DamagedVideo, ParameterError, VideoError
 from perdure.files.ahead import ahead
-from perdure.files.span import Span
+from perdure.files.span import Span, no_frame
 from perdure.types import Bits, Frame, Image, Scene
 
 
@@ -51,7 +51,7 @@ class Numbered:
                 f" ({self.total / self.fps:.2f} s)"
             )
         if self.total and not self._wanted:
-            raise ParameterError(f"start ({self.span.start or 0}) must lie before end ({self.span.end})")
+            raise ParameterError(no_frame(self.span))
 
     @property
     def count(self) -> int | None:

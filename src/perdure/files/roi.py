@@ -14,13 +14,16 @@ from typing import Any
 import numpy as np
 
 from perdure.errors import FormatError, ParameterError, VideoError
+from perdure.files.lines import why_not_json
+from perdure.files.span import shown
 from perdure.types import Bits
 
 Ring = list[tuple[float, float]]
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
 _BOX = re.compile(rf"\s*{_NUMBER}(?:\s*,\s*{_NUMBER}){{3}}\s*")
 _POLYGON = re.compile(rf"\s*{_NUMBER},{_NUMBER}(?:\s+{_NUMBER},{_NUMBER}){{2,}}\s*")
+_FARTHEST = 10**6  # px
 _FORMS = "an image or a file of polygons, a box 'x,y,w,h', or a polygon 'x,y x,y x,y'"
 
 
@@ -47,23 +50,39 @@ def read_roi(text_or_path: str | Path, width: int, height: int) -> Bits:
     FormatError
         For a file that is none of these.
     """
+    if not isinstance(text_or_path, (str, Path)):
+        raise ParameterError(f"roi = {shown(text_or_path)} is no region: give {_FORMS}")
     text = str(text_or_path)
-    if _BOX.fullmatch(text):
-        inside = _box(text, width, height)
-    elif _POLYGON.fullmatch(text):
-        inside = _filled([[_ring(text)]], width, height)
-    elif Path(text).is_file():
-        inside = _read_file(Path(text), width, height)
-    else:
-        raise ParameterError(f"roi = {text!r} is no file and no region: give {_FORMS}")
+    try:
+        inside = _read(text, width, height)
+    except ValueError as error:
+        raise ParameterError(f"roi = {shown(text)}: {error}") from None
     if not inside.any():
-        raise ParameterError(f"the roi {text!r} has no pixel inside the scene of {width}x{height}")
+        raise ParameterError(f"the roi {shown(text)} has no pixel inside the scene of {width}x{height}")
     return inside
+
+
+def _read(text: str, width: int, height: int) -> Bits:
+    """The region that a text is or names; ValueError for a coordinate too far out."""
+    if _BOX.fullmatch(text):
+        return _box(text, width, height)
+    if _POLYGON.fullmatch(text):
+        return _filled([[_ring(text)]], width, height)
+    if _is_file(text):
+        return _read_file(Path(text), width, height)
+    raise ParameterError(f"roi = {shown(text)} is no file and no region: give {_FORMS}")
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except OSError:  # no file can have this name
+        return False
 
 
 def _box(text: str, width: int, height: int) -> Bits:
     """The pixels whose centre is in the half-open box."""
-    x, y, w, h = (float(one) for one in text.split(","))
+    x, y, w, h = (_place(float(one)) for one in text.split(","))
     columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
     across, down = (columns >= x) & (columns < x + w), (rows >= y) & (rows < y + h)
     inside = np.zeros((height, width), np.bool_)
@@ -105,9 +124,12 @@ def _read_lines(path: Path, text: str) -> Iterator[list[Ring]]:
         if not bare:
             continue
         if not _POLYGON.fullmatch(bare):
-            raise FormatError(f"{path}, line {number}: not a polygon 'x,y x,y x,y': {line.strip()[:60]!r}")
+            raise FormatError(f"{path}, line {number}: not a polygon 'x,y x,y x,y': {shown(line.strip())}")
         found = True
-        yield [_ring(bare)]
+        try:
+            yield [_ring(bare)]
+        except ValueError as error:
+            raise FormatError(f"{path}, line {number}: {error}") from None
     if not found:
         raise FormatError(f"the roi {path} holds no polygon")
 
@@ -115,11 +137,14 @@ def _read_lines(path: Path, text: str) -> Iterator[list[Ring]]:
 def _read_json(path: Path, text: str) -> Iterator[list[Ring]]:
     try:
         written = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise FormatError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
+    except (ValueError, RecursionError) as error:
+        line = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        raise FormatError(f"{path}{line}: not JSON ({why_not_json(error)})") from None
     try:
         polygons = [[_points(ring) for ring in polygon] for polygon in _polygons(written)]
-    except (KeyError, TypeError, ValueError, RecursionError):
+    except ValueError as error:
+        raise FormatError(f"{path}: {error}") from None
+    except (KeyError, TypeError, RecursionError):
         raise FormatError(
             f"{path} is not GeoJSON of Polygon or MultiPolygon: points are [x, y] in pixels, at least three a ring"
         ) from None
@@ -144,19 +169,27 @@ def _polygons(written: Any) -> Iterator[Sequence[Any]]:
     elif kind == "Polygon":
         yield written["coordinates"]
     else:
-        raise ValueError(kind)
+        raise TypeError
 
 
-def _points(ring: Sequence[Sequence[float]]) -> Ring:
-    points = [(float(point[0]), float(point[1])) for point in ring]
-    if len(points) < 3 or not np.isfinite(points).all():
-        raise ValueError("a ring has at least three points")
-    return points
+def _points(ring: Any) -> Ring:
+    """The points of a ring; TypeError for what is none, ValueError for one too far out."""
+    if len(ring) < 3 or not all(isinstance(point, list) and len(point) > 1 for point in ring):
+        raise TypeError
+    if not {type(one) for point in ring for one in point[:2]} <= {int, float}:
+        raise TypeError
+    return [(_place(point[0]), _place(point[1])) for point in ring]
 
 
 def _ring(text: str) -> Ring:
     pairs = (one.split(",") for one in text.split())
-    return [(float(x), float(y)) for x, y in pairs]
+    return [(_place(float(x)), _place(float(y))) for x, y in pairs]
+
+
+def _place(number: float) -> float:
+    if not abs(number) <= _FARTHEST:
+        raise ValueError(f"a coordinate must lie in -{_FARTHEST} to {_FARTHEST} pixels")
+    return float(number)
 
 
 def _filled(polygons: list[list[Ring]], width: int, height: int) -> Bits:

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from numbers import Integral, Rational, Real
+from pathlib import Path
 
 from perdure.errors import ParameterError
 
 _SLACK = 1e-6  # s: timestamps are rounded to the container's own ticks
+_LONGEST = 10**9  # s, or frames
 _CLOCK = re.compile(r"(?:(?:(\d+):)?(\d{1,2}):)?(\d+(?:\.\d*)?|\.\d+)")
 
 
@@ -32,6 +35,11 @@ class Moment:
 
     def __str__(self) -> str:
         return f"{self.seconds:g} s" if self.frame is None else f"frame {self.frame}"
+
+    @property
+    def given(self) -> str:
+        """As the user may give it."""
+        return f"{self.seconds:g}" if self.frame is None else f"{self.frame}f"
 
 
 @dataclass(frozen=True)
@@ -63,12 +71,14 @@ def read_span(start: str | float | None, end: str | float | None, stride: int) -
     Raises
     ------
     ParameterError
-        For a moment that is malformed or negative, a start that is not before the end, or a stride
-        below 1.
+        For a moment that is malformed, negative or beyond 10^9, a start that is not before the end, an
+        end at the very beginning, or a stride below 1.
     """
-    if isinstance(stride, bool) or not isinstance(stride, int) or stride < 1:
-        raise ParameterError(f"stride = {stride!r} is out of range: it must be a whole number ≥ 1")
-    span = Span(_moment("start", start), _moment("end", end), stride)
+    if isinstance(stride, bool) or not isinstance(stride, Integral) or stride < 1:
+        raise ParameterError(f"stride = {shown(stride)} is out of range: it must be a whole number ≥ 1")
+    span = Span(_moment("start", start), _moment("end", end), int(stride))
+    if span.end is not None and not (span.end.frame or span.end.seconds):
+        raise ParameterError(no_frame(Span(end=span.end)))
     if span.start is not None and span.end is not None:
         same_kind = (span.start.frame is None) == (span.end.frame is None)
         before = (span.start.frame or span.start.seconds) < (span.end.frame or span.end.seconds)
@@ -77,21 +87,80 @@ def read_span(start: str | float | None, end: str | float | None, stride: int) -
     return span
 
 
+def no_frame(span: Span) -> str:
+    """Say that no frame lies in a span, and what would do."""
+    if span.start is None and span.end is not None:
+        return f"end = {span.end.given} leaves no frame: the first is at 0 s, give a later end"
+    return f"no frame lies between start ({span.start}) and end ({span.end}): give a later end"
+
+
+def shown(value: object) -> str:
+    """Return a value as a message of one line may show it, cut where it is long.
+
+    >>> shown(True), shown("a film"), shown({}), shown(2.5)
+    ('true', "'a film'", 'a dict', '2.5')
+    """
+    if isinstance(value, (str, Path)):
+        return f"'{cut(str(value))}'"
+    if isinstance(value, bool) or value is None:
+        return "nothing" if value is None else str(value).lower()
+    if isinstance(value, Rational) and abs(real(value)) >= 1e18:
+        return "a number of more than 18 digits"
+    if isinstance(value, Real):
+        return str(value) if isinstance(value, Integral) else f"{float(value):g}"
+    kind = type(value).__name__
+    return kind if kind == "bytes" else f"an {kind}" if kind[:1].lower() in "aeiou" else f"a {kind}"
+
+
+def cut(text: str, most: int = 60) -> str:
+    """Return a text on one line of visible letters, cut where it is longer."""
+    line = "".join(one if one.isprintable() else " " for one in text[: most + 1])
+    return line if len(line) <= most else line[:most] + "…"
+
+
+def real(value: object) -> float:
+    """Return a number as a float: infinite where it is too large, NaN for what is none, also yes and no."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
 def _moment(what: str, given: str | float | None) -> Moment | None:
     if given is None:
         return None
-    text = str(given).strip()
+    moment = _read_moment(given.strip()) if isinstance(given, str) else _seconds(given)
+    if moment is None:
+        raise ParameterError(
+            f"{what} = {shown(given)} is not a moment: give seconds ('12.5'), a time ('1:02' or '0:01:02.5')"
+            " or a frame ('300f'), not below 0, minutes and seconds up to 59"
+        )
+    if max(moment.seconds, moment.frame or 0) > _LONGEST:
+        raise ParameterError(f"{what} = {shown(given)} is out of range: it must be up to {_LONGEST} s or frames")
+    return moment
+
+
+def _seconds(given: object) -> Moment | None:
+    """A number of seconds; None for what is none."""
+    seconds = real(given)
+    return Moment(seconds) if seconds >= 0 else None
+
+
+def _read_moment(text: str) -> Moment | None:
+    """A time or a frame from its text; None for a text that is neither."""
     if re.fullmatch(r"\d+f", text):
-        return Moment(frame=int(text[:-1]))
-    if isinstance(given, (int, float)) and math.isfinite(given) and given >= 0:
-        return Moment(float(given))
+        return Moment(frame=_whole(text[:-1]))
     match = _CLOCK.fullmatch(text)
     if match is None:
-        raise ParameterError(
-            f"{what} = {given!r} is not a moment: give seconds ('12.5'), a time ('1:02' or '0:01:02.5')"
-            " or a frame ('300f'), not below 0"
-        )
+        return None
     hours, minutes, seconds = match.groups()
     if minutes is not None and (float(seconds) >= 60 or (hours is not None and int(minutes) >= 60)):
-        raise ParameterError(f"{what} = {given!r} is not a moment: minutes and seconds go up to 59")
-    return Moment(int(hours or 0) * 3600 + int(minutes or 0) * 60 + float(seconds))
+        return None
+    return Moment(_whole(hours or "0") * 3600.0 + int(minutes or 0) * 60 + float(seconds))
+
+
+def _whole(digits: str) -> int:
+    """A whole number; one of very many digits only as large as shows that it is out of range."""
+    return int(digits) if len(digits) <= 18 else 10**18

@@ -8,17 +8,20 @@ Every kind of source is a file of its own beside this one; this is the door.
 from __future__ import annotations
 
 import glob
-import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Protocol
+from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import ParameterError, VideoError
-from perdure.files.span import Span, read_span
+from perdure.files.span import Span, cut, read_span, real, shown
 from perdure.types import Bits, Frame, Scene
+
+RATES = (0.001, 1000.0)  # frames per second that a source may have
+_CAMERAS = 10**9
 
 
 class Source(Protocol):
@@ -111,7 +114,7 @@ def open_source(
         A video file, a folder or glob of images, a MOTChallenge folder (one with `seqinfo.ini`), a
         camera's number, a URL, or (H, W, 3) or (H, W) uint8 arrays, RGB or grey.
     fps : float or None
-        Frames per second, instead of what the source says: times become index / fps.
+        Frames per second in [0.001, 1000], instead of what the source says: times become index / fps.
     start, end : str, float or None
         Seconds (12.5, '1:02', '0:01:02.5') or a frame ('300f'); the end is not included.
     stride : int
@@ -126,20 +129,26 @@ def open_source(
     FormatError
         For a `seqinfo.ini` that is not what it should be.
     """
-    if fps is not None and not (math.isfinite(fps) and fps > 0):
-        raise ParameterError(f"fps = {fps!r} is out of range: it must be > 0 frames per second")
+    rate = _rate(fps)
     span = read_span(start, end, stride)
+    if isinstance(source, bool):
+        raise ParameterError(f"{shown(source)} is no source: give a file, a folder, a URL or a camera number")
     if isinstance(source, (int, np.integer)):
-        return _open_camera(int(source), fps, span)
+        return _open_camera(int(source), rate, span)
     if isinstance(source, (str, Path)):
-        return _open_place(source, fps, span)
-    if not isinstance(source, Iterable):
-        raise ParameterError(
-            f"source = {source!r} is not a file, folder, URL, camera number or iterable of arrays"
-        )
+        return _open_place(source, rate, span)
     from perdure.files.arrays import open_arrays
 
-    return open_arrays(source, fps, span)
+    return open_arrays(source, rate, span)
+
+
+def _rate(fps: object) -> float | None:
+    if fps is None:
+        return None
+    rate, (low, high) = real(fps), RATES
+    if not low <= rate <= high:
+        raise ParameterError(f"fps = {shown(fps)} is out of range: it must be {low:g} to {high:g} frames/s")
+    return rate
 
 
 def _open_place(source: str | Path, fps: float | None, span: Span) -> Source:
@@ -149,14 +158,21 @@ def _open_place(source: str | Path, fps: float | None, span: Span) -> Source:
     if "://" in text:
         from perdure.files.live import open_url
 
+        try:
+            urlsplit(text)
+        except ValueError:  # not shown: there may be a password in it
+            raise VideoError("the URL cannot be read: check how its host and port are written") from None
         return open_url(text, fps, span)
-    if text.isascii() and text.isdigit() and not Path(text).exists():
-        return _open_camera(int(text), fps, span)
     try:
+        if text.isascii() and text.isdigit() and len(text) < 10 and not Path(text).exists():
+            return _open_camera(int(text), fps, span)
         return _open_path(text, fps, span)
     except PermissionError as error:
         place = error.filename or text
         raise VideoError(f"{place} cannot be read: permission denied; check its rights") from None
+    except OSError as error:
+        place, why = cut(str(error.filename or text)), str(error.strerror or error).lower()
+        raise VideoError(f"{place} cannot be opened: {why}; check the name of the source") from None
 
 
 def _open_path(text: str, fps: float | None, span: Span) -> Source:
@@ -165,9 +181,13 @@ def _open_path(text: str, fps: float | None, span: Span) -> Source:
     path = Path(text)
     if path.is_dir():
         return images.open_folder(path, fps, span)
-    if path.exists():
+    if path.is_file():
         opener = images.open_single if path.suffix.lower() in images.SUFFIXES else recording.open_recording
         return opener(path, fps, span)
+    if path.exists():
+        raise VideoError(f"{path} is no regular file; give a file, a folder, a URL or a camera number")
+    if "\0" in text:
+        raise VideoError(f"{cut(text)} cannot be opened: there is a zero byte in the name")
     if glob.has_magic(text):
         return images.open_glob(text, fps, span)
     raise VideoError(_missing(path))
@@ -176,6 +196,8 @@ def _open_path(text: str, fps: float | None, span: Span) -> Source:
 def _open_camera(number: int, fps: float | None, span: Span) -> Source:
     from perdure.files.live import open_camera
 
+    if number >= _CAMERAS:
+        raise VideoError(f"there is no camera with a number from {_CAMERAS} on; the first is 0")
     return open_camera(number, fps, span)
 
 
@@ -185,8 +207,8 @@ def _missing(path: Path) -> str:
 
     folder = path.parent
     if not folder.is_dir():
-        return f"{path} does not exist: there is no folder {folder}"
+        return f"{cut(str(path), 250)} does not exist: there is no folder {cut(str(folder), 250)}"
     names = [one.name for one in folder.iterdir() if not one.name.startswith(".")]
     near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    return f"{path} does not exist{hint}"
+    return f"{cut(str(path), 250)} does not exist{hint}"
