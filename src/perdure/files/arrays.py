@@ -53,7 +53,7 @@ def open_arrays(arrays: Iterable[NDArray[np.uint8]], fps: float | None, span: Sp
 def _refuse_other(arrays: object) -> None:
     """Refuse what is no film of arrays, and say what would do."""
     if isinstance(arrays, np.ndarray):
-        if arrays.ndim == 2 or (arrays.ndim == 3 and arrays.shape[2] == 3):
+        if arrays.ndim == 2 or (arrays.ndim == 3 and arrays.shape[2] in (3, 4)):
             raise ParameterError("one picture is no film; give [picture] or an array (N, H, W, 3)")
         if arrays.ndim not in (3, 4) and arrays.shape != (0,):
             raise ParameterError(f"an array as a source must be (N, H, W, 3) or (N, H, W), not {arrays.shape}")
