@@ -33,7 +33,8 @@ def test_every_option_that_the_documents_name_exists():
         for kind in (*TRACKERS.values(), *DETECTORS.values())
         for one in params.describe(kind)
     }
-    source = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src/perdure/cli").glob("*.py"))
+    programs = [*(ROOT / "src/perdure/cli").glob("*.py"), *(ROOT / "bench").glob("*.py")]
+    source = "".join(path.read_text(encoding="utf-8") for path in programs)
     elsewhere = {"help", "check", "report-confidence"}  # ours, ruff's, and one read off its declaration
     assert {one for one in named if one not in declared | elsewhere and f'"--{one}"' not in source} - {
         "tracker"
