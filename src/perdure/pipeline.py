@@ -40,6 +40,18 @@ class Plan:
     tracker: Any
     classes: tuple[str, ...]
 
+    def check(self) -> None:
+        """Refuse a detector, tracker and source that do not go together."""
+        for what, part in (("detector", self.detector), ("tracker", self.tracker)):
+            if part.needs_pixels and not self.source.has_images:
+                raise ParameterError(
+                    f"{self.source.name} has no images and this {what} needs them; name a --detector FILE"
+                )
+        if self.classes and self.detector_name == "background":
+            raise ParameterError(
+                "the background detector names no classes; leave out --class or give --detector FILE"
+            )
+
     def prepared(self) -> Plan:
         """Return the plan with the detector's first look over the source taken, where both allow it."""
         if not (self.source.rereadable and self.source.has_images and hasattr(self.detector, "prepare")):
@@ -120,23 +132,24 @@ def plan(
     """
     if not isinstance(tracker, str) or tracker not in TRACKERS:
         raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
-    wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
     name = detector_name(detector)
     opened = open_source(source, fps=fps, start=start, end=end, stride=stride)
-    if detector is None and not opened.has_images:
-        detector, name = _own_detections(opened), "recorded"
-    of_tracker, of_detector = split(parameters or {}, tracker, name)
-    made_tracker = params.build(TRACKERS[tracker], of_tracker)
-    made_detector = params.build(DETECTORS[name], of_detector)
-    if name == "recorded":
-        made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
-    for what, made in (("detector", made_detector), ("tracker", made_tracker)):
-        if made.needs_pixels and not opened.has_images:
-            raise ParameterError(f"{opened.name} has no images and this {what} needs them; name a --detector FILE")
-    if wanted and name == "background":
-        raise ParameterError("the background detector names no classes; leave out --class or give --detector FILE")
-    scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
-    return Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted)
+    try:
+        if detector is None and not opened.has_images:
+            detector, name = _own_detections(opened), "recorded"
+        of_tracker, of_detector = split(parameters or {}, tracker, name)
+        made_tracker = params.build(TRACKERS[tracker], of_tracker)
+        made_detector = params.build(DETECTORS[name], of_detector)
+        if name == "recorded":
+            made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
+        region = None if roi is None else read_roi(roi, opened.width, opened.height)
+        wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
+        made = Plan(opened, opened.scene(region), name, made_detector, tracker, made_tracker, wanted)
+        made.check()
+    except BaseException:
+        opened.close()
+        raise
+    return made
 
 
 def track(source: AnySource, **options: Any) -> Tracks:
