@@ -190,7 +190,7 @@ def exposure(image: Image, mean: Single) -> Single:
 _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
 _HEALING = 5.0  # s over which a model that has seen nothing yet takes in what stands still
 _STRIP = 32  # rows
-_GRID = 48  # rows of the grid on which the exposure is measured
+_GRID = 32  # rows of the grid on which the exposure is measured
 _GREY = 4  # grey levels that the channels of a colourless picture may differ by
 _GAUSSIAN = 1.4826  # standard deviation of a Gaussian / its median absolute deviation
 

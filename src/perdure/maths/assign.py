@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 
 class Assignment(NamedTuple):
@@ -37,13 +36,22 @@ def assign(cost: NDArray[np.floating]) -> Assignment:
     """
     cost = np.asarray(cost, np.float64)
     allowed = np.isfinite(cost)
-    # A forbidden pair costs more than all allowed ones together: it is taken only when nothing else is left.
-    ceiling = 1.0 + 2.0 * float(cost[allowed].sum()) if allowed.any() else 1.0
-    rows, columns = linear_sum_assignment(np.where(allowed, cost, ceiling))
-    kept = allowed[rows, columns]
-    pairs = np.stack([rows[kept], columns[kept]], axis=1).astype(np.intp)  # (K, 2)
+    pairs = np.argwhere(allowed)  # (K, 2)
+    if (allowed.sum(axis=0) > 1).any() or (allowed.sum(axis=1) > 1).any():
+        pairs = _solve(cost, allowed)
     return Assignment(
         pairs,
         np.setdiff1d(np.arange(cost.shape[0]), pairs[:, 0]),
         np.setdiff1d(np.arange(cost.shape[1]), pairs[:, 1]),
     )
+
+
+def _solve(cost: NDArray[np.floating], allowed: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Pairs (K, 2) where some row or column has a choice."""
+    from scipy.optimize import linear_sum_assignment  # half a second to load; most scenes begin without a choice
+
+    # A forbidden pair costs more than all allowed ones together: it is taken only when nothing else is left.
+    ceiling = 1.0 + 2.0 * float(cost[allowed].sum())
+    rows, columns = linear_sum_assignment(np.where(allowed, cost, ceiling))
+    kept = allowed[rows, columns]
+    return np.stack([rows[kept], columns[kept]], axis=1).astype(np.intp)
