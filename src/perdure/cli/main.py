@@ -18,7 +18,7 @@ from perdure.cli.export import export
 from perdure.cli.track import track
 from perdure.errors import DamagedVideo, PerdureError
 
-DONE, DEFECT, MISTAKE, PART_LOST, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, MISTAKE, PART_LOST, INTERRUPTED = 0, 2, 3, 130  # and 1: a defect of ours, by its traceback
 
 app = typer.Typer(
     name="perdure",

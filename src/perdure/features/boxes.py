@@ -41,10 +41,3 @@ def overlaps(one: Boxes, other: Boxes) -> Float:
     shared = intersections(one, other)
     union = areas(one)[:, None] + areas(other)[None, :] - shared
     return np.asarray(np.divide(shared, union, out=np.zeros_like(shared), where=union > 0), np.float32)
-
-
-def enclosing(boxes: Boxes) -> Boxes:
-    """Return the one box (4,) around all boxes; zeros for none."""
-    if not len(boxes):
-        return np.zeros(4, np.float32)
-    return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
