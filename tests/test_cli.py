@@ -192,6 +192,14 @@ def test_an_roi_keeps_the_lower_walker_out(place: Path):
     assert set(read_tracks(place / "upper/tracks.txt").ids.tolist()) == {1}
 
 
+def test_a_long_polygon_is_no_file_name_when_a_run_is_replaced(place: Path):
+    polygon = " ".join(f"{x},{y}" for y in (0, 79) for x in (range(0, 119, 2) if y == 0 else range(118, -1, -2)))
+    assert len(polygon) > 300
+    for _ in range(2):
+        done = perdure("track", "walk.avi", "-o", "poly", "--no-video", "--roi", polygon, "--overwrite", at=place)
+        assert done.returncode == 0, done.stderr
+
+
 def test_parameters_of_a_file_count_and_those_of_the_command_line_win(place: Path):
     (place / "mine.json").write_text('{"patience": 3, "confirm": 0.5, "report_confidence": 0.25}')
     perdure(

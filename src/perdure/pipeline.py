@@ -205,7 +205,7 @@ def detector_name(detector: str | Path | None) -> str:
     """Return which kind of detector the user's word means."""
     if detector is None or str(detector) == "background":
         return "background"
-    if _is_file(detector):
+    if is_file(detector):
         return "recorded"
     if Path(str(detector)).suffix in (".txt", ".jsonl", ".csv"):
         raise FormatError(f"{detector}: there is no such file of detections")
@@ -213,7 +213,8 @@ def detector_name(detector: str | Path | None) -> str:
     raise ParameterError(f"{params.unknown_name('detector', str(detector), known)}, or name a file of detections")
 
 
-def _is_file(word: str | Path) -> bool:
+def is_file(word: str | Path) -> bool:
+    """Return whether a word names a file that is there; a polygon or an address may be too long for a name."""
     try:
         return Path(str(word)).is_file()
     except (OSError, ValueError):  # too long, or not a path at all

@@ -24,7 +24,7 @@ from perdure.errors import OutputError
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
 from perdure.fold import Step
-from perdure.pipeline import Plan, plan
+from perdure.pipeline import Plan, is_file, plan
 from perdure.trackers import TRACKERS
 
 _FAMILIES = (("tracker", TRACKERS), ("detector", DETECTORS), ("", {"What counts": Reporting}))
@@ -71,7 +71,7 @@ def track(
         parameters=given,
     )
     place = output or Path("perdure-runs") / made.source.name
-    inputs = [Path(one) for one in (source, detector, roi, parameters) if one is not None]
+    inputs = [Path(one) for one in (source, detector, roi, parameters) if one is not None and is_file(one)]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
     outcome = run(made, folder, reporting, window=window, film=not no_video)

@@ -68,7 +68,7 @@ class RunFolder:
         ------
         OutputError
             If it holds a run and `overwrite` is not asked, if it holds anything else, or if one of the
-            run's `inputs` would be replaced.
+            run's `inputs`, files that are there, would be replaced.
         """
         folder = RunFolder(path)
         try:
@@ -97,7 +97,7 @@ class RunFolder:
                 raise OutputError(
                     f"{place} is a folder where a file of the run belongs; name another folder with -o"
                 )
-            if any(place.exists() and one.exists() and place.samefile(one) for one in inputs):
+            if place.exists() and any(place.samefile(one) for one in inputs):
                 raise OutputError(
                     f"{place} is needed for this run and would be replaced; name another folder with -o"
                 )
