@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import perdure
-from perdure.files.mot import read_table, read_tracks
+from perdure.files.mot import read_tracks
+from perdure.files.mot_table import read_table
 from perdure.metrics.clear import clear
 
 DATA = Path(os.environ.get("PERDURE_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no videos at {DATA};
 
 def truth_of(path: Path, frames: int) -> perdure.Tracks:
     rows = read_tracks(path)
-    return rows.take((read_table(path)[:, 6] > 0) & (rows.frames < frames))
+    return rows.take((read_table(path).values[:, 6] > 0) & (rows.frames < frames))
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError
-from perdure.files.span import shown
-from perdure.types import Regions, Tracks
-from perdure.types.regions import FARTHEST
+from perdure.files.mot_table import MotTable, read_table
+from perdure.types import Regions, Rows, Tracks, Use
+
+PROTOCOLS = ("mot15", "mot17", "mot20")
+_PEDESTRIAN = 1
+_DISTRACTORS = {"mot15": (), "mot17": (2, 7, 8, 12), "mot20": (2, 6, 7, 8, 12)}
+_LAST_CLASS = 13
+_LARGEST = 2**53  # id: beyond it floats are not exact
 
 
 def write_rows(file: IO[str], rows: Tracks) -> None:
@@ -34,13 +39,55 @@ def read_tracks(path: Path, fps: float = 25.0) -> Tracks:
         Naming file and line.
     """
     table = read_table(path)
+    frames = table.values[:, 0] - 1
     return Tracks.of(
-        frames=table[:, 0] - 1,
-        times=(table[:, 0] - 1) / fps,
-        ids=table[:, 1],
-        boxes=_boxes(table),
-        confidence=table[:, 6] if table.shape[1] > 6 else None,
+        frames=frames,
+        times=frames / fps,
+        ids=table.values[:, 1],
+        boxes=table.boxes,
+        confidence=table.column(6, 1.0),
     )
+
+
+def read_said(path: Path) -> Rows:
+    """Return the rows of a MOTChallenge result file for scoring; whatever their confidence, all count.
+
+    Raises
+    ------
+    FormatError
+        Naming file and line; also for an id below 1, as detections have, and one that stands twice in a frame.
+    """
+    table = read_table(path)
+    return _rows(table, np.zeros(len(table.values), np.int8))
+
+
+def read_truth(path: Path, protocol: str = "auto") -> Rows:
+    """Return the rows of a MOTChallenge truth, each marked as the benchmark uses it.
+
+    Parameters
+    ----------
+    path : Path
+        Of the text.
+    protocol : 'auto', 'mot15', 'mot17' or 'mot20'
+        'mot15': rows whose 7th column (the flag) is 0 are not asked for. 'mot17': the 8th column is a class; only
+        pedestrians (1) are asked for, and rows said on a person on a vehicle (2), a static person (7), a
+        distractor (8) or a reflection (12) are excused. 'mot20': on other vehicles (6) as well. 'auto': 'mot17'
+        for nine columns of which the 8th is always a class from 1 to 13, else 'mot15'.
+
+    Raises
+    ------
+    FormatError
+        Naming file and line; also where a protocol wants a class and there is none.
+    """
+    table = read_table(path)
+    return _rows(table, _use(table, protocol_of(table) if protocol == "auto" else protocol))
+
+
+def protocol_of(table: MotTable) -> str:
+    """Return the protocol that a truth's columns speak of: 'mot17' or 'mot15'."""
+    kinds = table.column(7, -1.0)
+    classes = table.values.shape[1] == 9 and np.isin(kinds, np.arange(1, _LAST_CLASS + 1)).all()
+    return "mot17" if classes and len(kinds) else "mot15"
 
 
 def read_detections(path: Path) -> Mapping[int, Regions]:
@@ -54,13 +101,13 @@ def read_detections(path: Path) -> Mapping[int, Regions]:
         Naming file and line.
     """
     table = read_table(path)
-    scores = table[:, 6] if table.shape[1] > 6 else np.ones(len(table))
+    scores = table.column(6, 1.0)
     if len(scores) and (scores.min() < 0 or scores.max() > 1):
         span = scores.max() - scores.min()
         scores = (scores - scores.min()) / span if span > 0 else np.ones(len(scores))
-    boxes = _boxes(table)
-    order = np.argsort(table[:, 0], kind="stable")
-    frames, starts = np.unique(table[order, 0], return_index=True)
+    boxes, numbers = table.boxes.astype(np.float32), table.values[:, 0]
+    order = np.argsort(numbers, kind="stable")
+    frames, starts = np.unique(numbers[order], return_index=True)
     groups = np.split(order, starts[1:]) if len(frames) else []
     return {
         int(frame) - 1: Regions.of(boxes[rows], scores=scores[rows])
@@ -68,71 +115,32 @@ def read_detections(path: Path) -> Mapping[int, Regions]:
     }
 
 
-def read_table(path: Path) -> NDArray[np.float64]:
-    """Return the numbers of a MOTChallenge file, (N, 6 or more); commas or blanks between them.
-
-    Raises
-    ------
-    FormatError
-        Naming file and line, for a line that is no such row.
-    """
-    rows: list[list[float]] = []
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"cannot read {path}: {getattr(error, 'strerror', None) or 'it is not text'}") from error
-    for number, line in enumerate(lines, 1):
-        if line.strip():
-            rows.append(_row(path, number, line))
-            if len(rows[-1]) != len(rows[0]):
-                raise FormatError(
-                    f"{path}, line {number}: {len(rows[-1])} columns where line 1 has {len(rows[0])}"
-                )
-    return np.array(rows, np.float64) if rows else np.zeros((0, 7))
+def _use(table: MotTable, protocol: str) -> NDArray[np.int8]:
+    flagged = table.column(6, 1.0) == 0
+    if protocol == "mot15":
+        return np.where(flagged, Use.IGNORED, Use.SCORED).astype(np.int8)
+    if table.values.shape[1] < 8:
+        raise FormatError(f"{table.path} has no class in an 8th column, which {protocol} wants; score it as mot15")
+    kind = table.values[:, 7]
+    use = np.where(flagged | (kind != _PEDESTRIAN), Use.IGNORED, Use.SCORED)
+    return np.where(np.isin(kind, _DISTRACTORS[protocol]), Use.DISTRACTOR, use).astype(np.int8)
 
 
-def _row(path: Path, number: int, line: str) -> list[float]:
-    row = [_number(path, number, word) for word in _cells(path, number, line)]
-    if len(row) < 6 or not np.isfinite(row).all():
+def _rows(table: MotTable, use: NDArray[np.int8]) -> Rows:
+    frames, ids = table.values[:, 0].astype(np.int64) - 1, table.values[:, 1]
+    wrong = (ids < 1) | (ids != np.floor(ids)) | (ids > _LARGEST)
+    if wrong.any():
+        place = int(np.argmax(wrong))
+        hint = "; these are detections, not tracks" if ids[place] == -1 else ""
         raise FormatError(
-            f"{path}, line {number}: {shown(line.strip())} is not frame, id, left, top, width, height"
+            f"{table.path}, line {table.lines[place]}: id {ids[place]:g} is not a whole number ≥ 1{hint}"
         )
-    if not 1 <= row[0] <= _LAST or row[0] != int(row[0]):
-        raise FormatError(f"{path}, line {number}: frame {row[0]:g} is not a whole number from 1 to {_LAST}")
-    left, top, width, height = row[2:6]
-    reach = max(abs(one - 1) for one in (left, top, left + width, top + height))
-    if min(width, height) < 0 or reach > FARTHEST:
-        raise FormatError(f"{path}, line {number}: a box of {width:g}x{height:g} at ({left:g}, {top:g}) cannot be")
-    if max(abs(one) for one in row[6:7] or [0]) > _SUREST:
-        raise FormatError(f"{path}, line {number}: a confidence of {row[6]:g} cannot be")
-    return row
-
-
-def _cells(path: Path, number: int, line: str) -> list[str]:
-    """The words of a line: between commas, one of which may end it, or else between blanks."""
-    if "," not in line:
-        return line.split()
-    cells = [cell.strip() for cell in line.strip().removesuffix(",").split(",")]
-    if "" in cells:
+    order = np.lexsort((ids, frames))
+    twice = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
+    if twice.any():
+        first, second = order[:-1][twice][0], order[1:][twice][0]
         raise FormatError(
-            f"{path}, line {number}: cell {cells.index('') + 1} is empty; give a number, -1 for none"
+            f"{table.path}, line {table.lines[second]}: id {ids[second]:.0f} stands twice in frame"
+            f" {frames[second] + 1}, first in line {table.lines[first]}"
         )
-    return cells
-
-
-def _number(path: Path, number: int, word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        raise FormatError(
-            f"{path}, line {number}: {shown(word)} is no number; wanted are frame, id, left, top, …"
-        ) from None
-
-
-def _boxes(table: NDArray[np.float64]) -> NDArray[np.float32]:
-    corner = table[:, 2:4] - 1.0
-    return np.concatenate([corner, corner + table[:, 4:6]], axis=1).astype(np.float32)
-
-
-_LAST = 10**9  # frame
-_SUREST = 1e30  # beyond which a span of scores might not be a number
+    return Rows.of(frames=frames, ids=ids, boxes=table.boxes, use=use)

@@ -8,6 +8,7 @@ from perdure.types.arrays import Bits, Boxes, Image
 from perdure.types.frame import Frame, Mask
 from perdure.types.regions import Regions
 from perdure.types.report import Dropped, Event, Explanation, Renamed, Report
+from perdure.types.rows import Rows, Use
 from perdure.types.scene import Scene
 from perdure.types.tracks import TRACK_COLUMNS, Ground, Status, Tracks
 
@@ -25,7 +26,9 @@ __all__ = [
     "Regions",
     "Renamed",
     "Report",
+    "Rows",
     "Scene",
     "Status",
     "Tracks",
+    "Use",
 ]
