@@ -41,3 +41,17 @@ def overlaps(one: Boxes, other: Boxes) -> Float:
     shared = intersections(one, other)
     union = areas(one)[:, None] + areas(other)[None, :] - shared
     return np.asarray(np.divide(shared, union, out=np.zeros_like(shared), where=union > 0), np.float32)
+
+
+def exact_overlaps(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return intersection over union (N, M) in float64, for scores, where a threshold may hang on the last digit."""
+    low = np.maximum(one[:, None, :2], other[None, :, :2])  # (N, M, 2)
+    high = np.minimum(one[:, None, 2:], other[None, :, 2:])  # (N, M, 2)
+    side = np.maximum(high - low, 0.0)
+    shared = side[..., 0] * side[..., 1]
+    extent = [np.maximum(boxes[:, 2:] - boxes[:, :2], 0.0) for boxes in (one, other)]
+    union = extent[0].prod(axis=1)[:, None] + extent[1].prod(axis=1)[None, :] - shared
+    return np.asarray(np.divide(shared, union, out=np.zeros_like(shared), where=union > EPSILON), np.float64)
+
+
+EPSILON = float(np.finfo(np.float64).eps)
