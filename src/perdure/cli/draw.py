@@ -11,6 +11,7 @@ import typer
 from perdure.cli import options
 from perdure.cli.film import draw_film
 from perdure.cli.stopping import Ending
+from perdure.comparison import marks_by_frame
 from perdure.errors import OutputError, VideoError
 from perdure.files.runs import RunFolder
 from perdure.files.video import open_source
@@ -25,6 +26,15 @@ def draw(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="The film: .mp4 or .webm.", show_default=False)
     ],
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            "--truth",
+            metavar="TRUTH",
+            help="Show what departs from it, as `perdure score --errors` lists: MOT or MOTS text, or a folder with gt/gt.txt.",
+            show_default=False,
+        ),
+    ] = None,
     overwrite: options.OverwriteOption = False,
     fps: options.FpsOption = None,
     start: options.StartOption = None,
@@ -55,9 +65,10 @@ def draw(
         )
     if opened.rereadable and Path(source).exists() and output.exists() and output.samefile(source):
         raise OutputError(f"{output} is the source itself; name another file with -o")
+    marks = None if truth is None else marks_by_frame(run, truth, linger=round(opened.fps))
     with Ending() as ending:
         ending.at_once()
-        damage = draw_film(opened, opened.scene(None), folder, opened.count, output)
+        damage = draw_film(opened, opened.scene(None), folder, opened.count, output, marks)
     opened.close()
     if damage is not None and not output.exists():
         raise damage

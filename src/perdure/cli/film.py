@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from perdure.cli.progress import watched
-from perdure.draw import Trails, paint
+from perdure.draw import Mark, Trails, paint
 from perdure.errors import DamagedVideo
 from perdure.files.film import Film
 from perdure.files.runs import RunFolder
@@ -16,11 +16,17 @@ from perdure.types import Scene, Tracks
 
 
 def draw_film(
-    source: Source, scene: Scene, folder: RunFolder, count: int | None, path: Path | None = None
+    source: Source,
+    scene: Scene,
+    folder: RunFolder,
+    count: int | None,
+    path: Path | None = None,
+    marks: Mapping[int, Sequence[Mark]] | None = None,
 ) -> DamagedVideo | None:
     """Draw the settled tracks of a run over its source; return the damage at which the source broke off, if any.
 
-    The film ends where the source does; without a frame there is none.
+    The film ends where the source does; without a frame there is none. `marks` are the departures from a truth
+    by frame, where they are to be shown.
     """
     rows_of = _Rows(folder.settled_by_frame())
     frames = 0
@@ -30,7 +36,8 @@ def draw_film(
             for frame in watched(source, "drawing the film", count):
                 rows = rows_of.at(frame.index)
                 trails = trails.extended(rows, frame.time)
-                film.write(paint(frame, rows, trails, scene), frame.time)
+                here = None if marks is None else marks.get(frame.index, ())
+                film.write(paint(frame, rows, trails, scene, marks=here), frame.time)
                 frames += 1
                 if count is not None and frames >= count:
                     break

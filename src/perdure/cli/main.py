@@ -15,6 +15,7 @@ from perdure.cli.demo import demo
 from perdure.cli.detect import detect
 from perdure.cli.draw import draw
 from perdure.cli.export import export
+from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
 from perdure.errors import DamagedVideo, PerdureError
 
@@ -45,6 +46,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
 
 for command in (track, detect, draw, export, demo):
     app.command()(_interruptible(command))
+app.command(cls=ScoreCommand)(_interruptible(score))
 
 
 def _print_version(wanted: bool) -> None:

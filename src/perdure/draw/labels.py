@@ -28,16 +28,21 @@ class Label(NamedTuple):
     gap: int
 
 
-def lay_labels(picture: Image, clock: str, labels: Sequence[Label], size: int) -> None:
-    """Write the clock into the lower left corner and each label at its box, the first ones first.
+def lay_labels(picture: Image, clock: str, labels: Sequence[Label], size: int, *, title: str = "") -> None:
+    """Write the clock into the lower left corner, a title into the upper, and each label at its box, in order.
 
     What is larger than the picture allows is left out. `size` is the height of the letters in pixels.
     """
     taken: list[Place] = []
     margin = size // 3
-    corner = _chip(clock, DARK, LIGHT, max(10, round(size * 0.85)))
-    if corner.shape[0] + 2 * margin <= picture.shape[0] // 3 and corner.shape[1] + 2 * margin <= picture.shape[1]:
-        taken.append(_lay(picture, margin, picture.shape[0] - margin - corner.shape[0], corner, 0.75))
+    for text, top in ((title, True), (clock, False)):
+        chip = _chip(text or " ", DARK, LIGHT, max(10, round(size * 0.85)))
+        room = (
+            chip.shape[0] + 2 * margin <= picture.shape[0] // 3 and chip.shape[1] + 2 * margin <= picture.shape[1]
+        )
+        if text and room:
+            y = margin if top else picture.shape[0] - margin - chip.shape[0]
+            taken.append(_lay(picture, margin, y, chip, 0.75))
     for label in labels:
         paper, letters = (label.colour, readable_on(label.colour)) if label.bold else (DARK, label.colour)
         chip = _chip(label.text, paper, letters, size)

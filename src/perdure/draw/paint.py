@@ -25,17 +25,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.draw.colours import Colour, colour_of, dimmer
-from perdure.draw.labels import Label, Place, lay_labels
+from perdure.draw.labels import Label, lay_labels
+from perdure.draw.marks import LEGEND, Mark, mark_labels, mark_strokes
+from perdure.draw.strokes import Lines, Stroke, Style, brackets, broken, whole
 from perdure.draw.trails import Trails, draw_trails
 from perdure.types import Frame, Image, Mask, Scene, Status, Tracks
-
-Lines = list[NDArray[np.int32]]  # each (n, 2): points x, y
 
 _CANVAS: Colour = (30, 33, 40)
 _NAMED_MEMBERS = 6
 
 
-def paint(frame: Frame, rows: Tracks, trails: Trails, scene: Scene, *, masks: bool = True) -> Image:
+def paint(
+    frame: Frame,
+    rows: Tracks,
+    trails: Trails,
+    scene: Scene,
+    *,
+    masks: bool = True,
+    marks: Sequence[Mark] | None = None,
+) -> Image:
     """Return a new picture of the frame with its rows drawn in.
 
     Parameters
@@ -50,6 +58,8 @@ def paint(frame: Frame, rows: Tracks, trails: Trails, scene: Scene, *, masks: bo
         Gives the size where the frame has no image.
     masks : bool
         Whether silhouettes are drawn too.
+    marks : sequence of Mark, or None
+        What departs from a truth in this frame, and a line that says what the marks mean; None for neither.
 
     Returns
     -------
@@ -57,7 +67,7 @@ def paint(frame: Frame, rows: Tracks, trails: Trails, scene: Scene, *, masks: bo
     """
     picture = _canvas(frame, scene)
     height, width = picture.shape[:2]
-    style = _Style.of(height)
+    style = Style.of(height)
     seen = rows.take(_inside(rows, height, width))
     looks = _looks(seen, style)
     silhouettes = _silhouettes(seen, looks, style, height, width) if masks else []
@@ -72,31 +82,12 @@ def paint(frame: Frame, rows: Tracks, trails: Trails, scene: Scene, *, masks: bo
         cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width, cv2.LINE_AA)
     for stroke in boxes:  # upright lines are crisp without anti-aliasing
         cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width)
-    clock = f"{frame.index}   {frame.time:.2f} s"
-    lay_labels(picture, clock, _labels(seen, looks, style), style.letters)
+    for stroke in mark_strokes(marks or (), style):
+        cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width, cv2.LINE_AA)
+    labels = [*_labels(seen, looks, style), *mark_labels(marks or (), style, height, width)]
+    title = "" if marks is None else LEGEND
+    lay_labels(picture, f"{frame.index}   {frame.time:.2f} s", labels, style.letters, title=title)
     return picture
-
-
-class _Style(NamedTuple):
-    """Widths in pixels for a picture's height."""
-
-    line: int
-    thin: int
-    halo: int  # what the dark band adds to a line's width
-    letters: int  # height of the letters' box
-    dash: float
-
-    @property
-    def gap(self) -> int:
-        """How far a group's brackets stay away from its box."""
-        return 2 * self.line + 2
-
-    @staticmethod
-    def of(height: int) -> _Style:
-        # Two pixels at least where there is room: a film stores colour at half the resolution.
-        line = max(1 if height < 200 else 2, round(height / 320))
-        halo = 2 * max(1, round(height / 900))
-        return _Style(line, max(1, line - 1), halo, max(11, round(height / 38)), 3.0 + 2.5 * line)
 
 
 class _Look(NamedTuple):
@@ -107,14 +98,6 @@ class _Look(NamedTuple):
     dashes: tuple[tuple[float, float] | None, ...]  # (drawn, left out) in pixels; None for solid
     bold: bool  # a chip in full colour and a line of full width
     group: bool
-
-
-class _Stroke(NamedTuple):
-    """Lines of one colour and width."""
-
-    lines: Lines
-    colour: Colour
-    width: int
 
 
 def _canvas(frame: Frame, scene: Scene) -> Image:
@@ -132,7 +115,7 @@ def _inside(rows: Tracks, height: int, width: int) -> NDArray[np.bool_]:
     return np.asarray((x1 < width) & (y1 < height) & (x2 > 0) & (y2 > 0))
 
 
-def _looks(rows: Tracks, style: _Style) -> list[_Look]:
+def _looks(rows: Tracks, style: Style) -> list[_Look]:
     is_group = rows.is_group
     looks = []
     for i, identity in enumerate(rows.ids.tolist()):
@@ -153,7 +136,7 @@ def _group_text(identity: int, members: Sequence[int]) -> str:
     return f"group {identity}: {named}" + (f" +{more}" if more > 0 else "")
 
 
-def _dashes(status: Status, hidden_side: str, style: _Style) -> tuple[tuple[float, float] | None, ...]:
+def _dashes(status: Status, hidden_side: str, style: Style) -> tuple[tuple[float, float] | None, ...]:
     dash = style.dash
     if status == Status.PARTLY_OCCLUDED:
         hidden = hidden_side.split("+")
@@ -201,19 +184,17 @@ def _tint(crop: Image, colour: Colour, share: float, bits: NDArray[np.uint8] | N
         cv2.copyTo(mixed, bits, crop)
 
 
-def _silhouettes(rows: Tracks, looks: Sequence[_Look], style: _Style, height: int, width: int) -> list[_Stroke]:
+def _silhouettes(rows: Tracks, looks: Sequence[_Look], style: Style, height: int, width: int) -> list[Stroke]:
     """Outlines of what is seen, and dotted ones of what is believed where part of it is hidden."""
     strokes = []
     for i, look in enumerate(looks):
         seen = _outlines(rows.masks[i], height, width)
         if seen:
-            strokes.append(_Stroke(seen, look.colour, style.thin))
+            strokes.append(Stroke(seen, look.colour, style.thin))
         whole = rows.believed[i]
         if whole is not None and rows.status[i] in (Status.PARTLY_OCCLUDED, Status.OCCLUDED):
-            dots = [
-                part for line in _outlines(whole, height, width) for part in _broken(line, 2.0, style.dash / 2)
-            ]
-            strokes.append(_Stroke(dots, dimmer(look.colour), style.thin))
+            dots = [part for line in _outlines(whole, height, width) for part in broken(line, 2.0, style.dash / 2)]
+            strokes.append(Stroke(dots, dimmer(look.colour), style.thin))
     return strokes
 
 
@@ -230,53 +211,28 @@ def _outlines(mask: Mask, height: int, width: int) -> Lines:
 # Boxes ------------------------------------------------------------------------------------------------------
 
 
-def _box_stroke(box: NDArray[np.float32], look: _Look, style: _Style) -> _Stroke:
-    x1, y1, x2, y2 = _whole(box)
+def _box_stroke(box: NDArray[np.float32], look: _Look, style: Style) -> Stroke:
+    x1, y1, x2, y2 = whole(box)
     x2, y2 = max(x2 - 1, x1), max(y2 - 1, y1)  # half-open: the last pixel inside
     if look.group:
-        return _Stroke(_brackets(x1, y1, x2, y2, style), look.colour, style.line)
+        return Stroke(brackets(x1, y1, x2, y2, style), look.colour, style.line)
     if not look.bold and min(x2 - x1, y2 - y1) < 4 * style.dash:  # dashes would not make a box
-        return _Stroke(_brackets(x1, y1, x2, y2, style), look.colour, style.thin)
+        return Stroke(brackets(x1, y1, x2, y2, style), look.colour, style.thin)
     if not any(look.dashes):
         ring = np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]], np.int32)
-        return _Stroke([ring], look.colour, style.line)
+        return Stroke([ring], look.colour, style.line)
     sides = ([[x1, y1], [x1, y2]], [[x1, y1], [x2, y1]], [[x2, y1], [x2, y2]], [[x1, y2], [x2, y2]])
     lines: Lines = []
     for side, dashes in zip(sides, look.dashes, strict=True):
         line = np.array(side, np.int32)
-        lines.extend([line] if dashes is None else _broken(line, *dashes))
-    return _Stroke(lines, look.colour, style.line if look.bold else style.thin)
-
-
-def _whole(box: NDArray[np.float32]) -> Place:
-    """Whole pixels; far corners are brought near, because cv2 counts lines in 16 bits."""
-    x1, y1, x2, y2 = (round(value) for value in np.clip(box, -16000, 16000).tolist())
-    return x1, y1, x2, y2
-
-
-def _brackets(x1: int, y1: int, x2: int, y2: int, style: _Style) -> Lines:
-    x1, y1, x2, y2 = x1 - style.gap, y1 - style.gap, x2 + style.gap, y2 + style.gap
-    arm = max(3, min(x2 - x1, y2 - y1) // 4)
-    corners = ((x1, y1, 1, 1), (x2, y1, -1, 1), (x2, y2, -1, -1), (x1, y2, 1, -1))
-    return [
-        np.array([[x + arm * right, y], [x, y], [x, y + arm * down]], np.int32) for x, y, right, down in corners
-    ]
-
-
-def _broken(line: NDArray[np.int32], drawn: float, left_out: float) -> Lines:
-    """Cut a line (n, 2) into dashes, counted from its first point."""
-    steps = np.hypot(*np.diff(line, axis=0).T.astype(np.float64))
-    along = np.concatenate([[0.0], np.cumsum(steps)])  # (n,)
-    begin = np.arange(0.0, max(along[-1], 1.0), drawn + left_out)
-    ends = np.stack([begin, np.minimum(begin + drawn - 1.0, along[-1])], axis=1)  # (dashes, 2)
-    x, y = (np.interp(ends, along, line[:, axis]) for axis in (0, 1))
-    return list(np.rint(np.stack([x, y], axis=2)).astype(np.int32))  # each (2, 2)
+        lines.extend([line] if dashes is None else broken(line, *dashes))
+    return Stroke(lines, look.colour, style.line if look.bold else style.thin)
 
 
 # The dark band ----------------------------------------------------------------------------------------------
 
 
-def _darken_beneath(picture: Image, strokes: Sequence[_Stroke], style: _Style) -> None:
+def _darken_beneath(picture: Image, strokes: Sequence[Stroke], style: Style) -> None:
     """Lay the dark band under all lines at once."""
     band = np.zeros(picture.shape[:2], np.uint8)
     for stroke in strokes:
@@ -287,14 +243,14 @@ def _darken_beneath(picture: Image, strokes: Sequence[_Stroke], style: _Style) -
 # Labels -----------------------------------------------------------------------------------------------------
 
 
-def _labels(rows: Tracks, looks: Sequence[_Look], style: _Style) -> list[Label]:
+def _labels(rows: Tracks, looks: Sequence[_Look], style: Style) -> list[Label]:
     """The labels, the surest and nearest first: they choose their places first; small unseen targets have none."""
     sides = np.minimum(*(rows.boxes[:, 2:] - rows.boxes[:, :2]).T)
     named = [i for i in range(len(rows)) if looks[i].bold or sides[i] > 1.5 * style.letters]
     order = sorted(named, key=lambda i: (looks[i].bold, float(rows.boxes[i][3])), reverse=True)
     return [
         Label(
-            look.text, look.colour, look.bold, _whole(rows.boxes[i]), style.gap if look.group else style.line // 2
+            look.text, look.colour, look.bold, whole(rows.boxes[i]), style.gap if look.group else style.line // 2
         )
         for i, look in ((i, looks[i]) for i in order)
     ]

@@ -167,9 +167,20 @@ class RunFolder:
         """Yield (frame, settled rows), all statuses, groups too; memory stays bounded."""
         return settle_by_frame(lambda: (entry.report for entry in read_log(self.log)))
 
-    def tracks(self) -> Tracks:
-        """Return all settled rows at once."""
-        return settle(entry.report for entry in read_log(self.log))
+    def tracks(self, *, with_masks: bool = True) -> Tracks:
+        """Return all settled rows at once; without silhouettes, which is faster, where nobody needs them."""
+        return settle(entry.report for entry in read_log(self.log, with_masks=with_masks))
+
+    def events(self) -> tuple[Event, ...]:
+        """Return all events with their settled ids; those whose ids were all dropped are left out."""
+        entries = [entry.report for entry in read_log(self.log, with_masks=False)]
+        corrections = Corrections.of(entries)
+        settled = [
+            (event, corrections.event(event, number))
+            for number, report in enumerate(entries)
+            for event in report.events
+        ]
+        return tuple(after for before, after in settled if after.ids or not before.ids)
 
     def write_results(self, reporting: Reporting) -> Totals:
         """Settle the log into `tracks.txt` and `events.csv`, streaming."""

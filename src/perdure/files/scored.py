@@ -1,0 +1,240 @@
+"""What is at a path, for a comparison: a result (run folder, MOT or MOTS text, index PNGs), a truth (these, a clip)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from perdure.errors import FormatError, ParameterError
+from perdure.files import mask_pngs, mots
+from perdure.files.clip import read_blobs, read_clip_events
+from perdure.files.images import natural_order
+from perdure.files.mot import protocol_of, read_said, read_truth
+from perdure.files.mot_table import read_lines, read_table
+from perdure.files.runs import RunFolder
+from perdure.types import Event, Rows, Tracks
+
+_BOXES, _VISIBLE, _CLIP, _BLOBS = "gt/gt.txt", "gt/visible.txt", "clip.json", "gt/blobs.txt"
+_PLAIN_NAMES = ("gt", "tracks", "visible", "amodal")  # of a file that its folder gives a better name
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What somebody said of a sequence.
+
+    Parameters
+    ----------
+    boxes : Rows
+        The rows that count.
+    masks : Rows or None
+        The same with silhouettes, where there are any.
+    tracks, events
+        Of a run: all its rows, those of groups too, and its events; None of anything else.
+    report_confidence : float or None
+        Of a run: from which confidence hidden targets count.
+    """
+
+    path: Path
+    boxes: Rows
+    masks: Rows | None = None
+    tracks: Tracks | None = None
+    events: tuple[Event, ...] | None = None
+    report_confidence: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What is true of a sequence, as far as it is known.
+
+    Parameters
+    ----------
+    boxes, masks : Rows or None
+    protocol : str
+        How rows are used: 'mot15', 'mot17', 'mot20', 'mots' or 'masks'.
+    events : tuple of Event or None
+    blobs : frame → the ids in each connected blob, or None
+    pictures : tuple of int or None
+        The frames that have a picture, of a folder of these.
+    """
+
+    path: Path
+    boxes: Rows | None
+    masks: Rows | None
+    protocol: str
+    events: tuple[Event, ...] | None = None
+    blobs: Mapping[int, Sequence[frozenset[int]]] | None = None
+    pictures: tuple[int, ...] | None = None
+
+
+def find_results(paths: Iterable[Path]) -> list[tuple[str, Path]]:
+    """Return (name, path) of every result at the paths; a folder of several is opened.
+
+    Raises
+    ------
+    FormatError
+        If there is none at a path.
+    """
+    return [one for path in paths for one in _find(path, _is_result, "result")]
+
+
+def find_truths(paths: Iterable[Path]) -> list[tuple[str, Path]]:
+    """Return (name, path) of every truth at the paths; a folder of several is opened.
+
+    Raises
+    ------
+    FormatError
+        If there is none at a path.
+    """
+    return [one for path in paths for one in _find(path, _is_truth, "truth")]
+
+
+def paired(
+    results: Sequence[tuple[str, Path]], truths: Sequence[tuple[str, Path]]
+) -> list[tuple[str, Path, Path]]:
+    """Return (name, result, truth): by equal names, else in order, else all results against the one truth.
+
+    Raises
+    ------
+    ParameterError
+        If none of these can be done.
+    """
+    by_name = dict(truths)
+    names = [name for name, _ in results]
+    if len(by_name) == len(truths) and len(set(names)) == len(names) and set(names) <= set(by_name):
+        return [(name, path, by_name[name]) for name, path in results]
+    if len(results) == len(truths):
+        return [(name, path, truth) for (_, path), (name, truth) in zip(results, truths, strict=True)]
+    if len(truths) == 1:
+        return [(name, path, truths[0][1]) for name, path in results]
+    lost = next((name for name in names if name not in by_name), names[0])
+    known = ", ".join(sorted(by_name)[:8])
+    raise ParameterError(
+        f"{len(results)} results and {len(truths)} truths: give as many of both, in the same order, or name them"
+        f" alike; there is no truth named {lost!r} among {known}"
+    )
+
+
+def read_result(path: Path, *, masks: bool, report_confidence: float | None = None) -> Result:
+    """Read a result.
+
+    Parameters
+    ----------
+    path : Path
+        A run folder, a MOT or MOTS text, a folder of index PNGs.
+    masks : bool
+        Silhouettes are wanted, which of a run takes longer to read.
+    report_confidence : float or None
+        From which confidence hidden targets of a run count; None for the run's own.
+
+    Raises
+    ------
+    FormatError
+        Naming file and line.
+    """
+    if (path / "tracks.jsonl").is_file():
+        return _read_run(RunFolder(path), masks, report_confidence)
+    if path.is_dir():
+        rows = mask_pngs.read_masks(path)
+        return Result(path, rows, rows)
+    if is_mots(path):
+        rows = mots.read_masks(path)
+        return Result(path, rows, rows)
+    return Result(path, read_said(path))
+
+
+def read_scored_truth(path: Path, *, masks: bool, protocol: str = "auto") -> Truth:
+    """Read a truth; silhouettes of a clip only where they are wanted.
+
+    Raises
+    ------
+    FormatError
+        Naming file and line.
+    """
+    boxes = _in_folder(path) if path.is_dir() else path
+    if boxes is None:
+        pictures = [frame for frame, _ in mask_pngs.pictures_in(path)]
+        return Truth(path, None, mask_pngs.read_masks(path, void=True), "masks", pictures=tuple(pictures))
+    home = boxes.parent.parent if boxes.parent.name == "gt" else boxes.parent
+    clip, blobs = home / _CLIP, home / _BLOBS
+    events = read_clip_events(clip) if clip.is_file() else None
+    shared = read_blobs(blobs) if blobs.is_file() else None
+    if is_mots(boxes):
+        return Truth(path, None, mots.read_masks(boxes), "mots", events, shared)
+    visible = home / _VISIBLE
+    seen = mots.read_masks(visible) if masks and visible.is_file() else None
+    used = protocol_of(read_table(boxes)) if protocol == "auto" else protocol
+    return Truth(path, read_truth(boxes, used), seen, used, events, shared)
+
+
+def is_mots(path: Path) -> bool:
+    """Return whether a text holds silhouettes: six words between blanks, of which the last is no number."""
+    first = next((line for line in read_lines(path) if line.strip()), "")
+    words = first.split()
+    return "," not in first.partition(" ")[0] and len(words) == 6 and not _is_number(words[5])
+
+
+def _read_run(folder: RunFolder, masks: bool, report_confidence: float | None) -> Result:
+    told = folder.read_about().get("reporting", {}).get("report_confidence", 0.5)
+    least = told if report_confidence is None else report_confidence
+    tracks = folder.tracks(with_masks=masks)
+    counted = Rows.of_tracks(tracks.counted(least))
+    size = tuple(folder.read_about().get(name) for name in ("height", "width"))
+    if all(isinstance(one, int) for one in size):
+        counted = counted.replace(size=size)
+    return Result(folder.path, counted, counted if masks else None, tracks, folder.events(), least)
+
+
+def _find(path: Path, is_one: Callable[[Path], bool], what: str) -> list[tuple[str, Path]]:
+    if path.name == "tracks.jsonl" and path.is_file():
+        path = path.parent
+    if is_one(path):
+        return [(_name(path), path)]
+    if not path.exists():
+        raise FormatError(f"there is no {path}")
+    inside = sorted(path.iterdir(), key=natural_order) if path.is_dir() else []
+    found = [(_name(one), one) for one in inside if not one.name.startswith(".") and is_one(one)]
+    if not found:
+        wanted = "a run folder, MOT or MOTS text, or a folder of index PNGs" + (
+            "" if what == "result" else ", or a folder with gt/gt.txt"
+        )
+        raise FormatError(f"{path} holds no {what}; wanted is {wanted}, or a folder of these")
+    return found
+
+
+def _is_result(path: Path) -> bool:
+    if path.is_dir():
+        return (path / "tracks.jsonl").is_file() or any(path.glob("*.png"))
+    return path.is_file() and path.suffix == ".txt"
+
+
+def _is_truth(path: Path) -> bool:
+    if path.is_dir():
+        return _in_folder(path) is not None or any(path.glob("*.png"))
+    return path.is_file() and path.suffix == ".txt"
+
+
+def _in_folder(folder: Path) -> Path | None:
+    """The text of a sequence's truth in its folder."""
+    for name in (_BOXES, "gt.txt", _VISIBLE):
+        if (folder / name).is_file():
+            return folder / name
+    return None
+
+
+def _name(path: Path) -> str:
+    if path.is_dir():
+        return path.parent.name if path.name == "gt" else path.resolve().name
+    stem = path.name.removesuffix(path.suffix).removesuffix(".gt")
+    if stem not in _PLAIN_NAMES:
+        return stem
+    home = path.resolve().parent
+    return home.parent.name if home.name == "gt" else home.name
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
