@@ -86,7 +86,7 @@ def test_a_reference_is_matched_to_at_most_one_of_two_said_boxes():
     both = Rows.of(
         frames=np.tile(np.arange(4), 2),
         ids=[97] * 4 + [98] * 4,
-        boxes=np.concatenate([truth.boxes, beside.boxes + (3, 0, 3, 0)]),
+        boxes=np.concatenate([truth.boxes, np.add(beside.boxes, (3, 0, 3, 0))]),
     )
     score = etiseo(compare(both, truth))
     assert (score.m1, score.m2, score.m3, score.noisy) == (1, 1, 1, 1)
@@ -95,7 +95,7 @@ def test_a_reference_is_matched_to_at_most_one_of_two_said_boxes():
 @pytest.mark.parametrize(("shift", "found"), [(4.9, True), (5.0, True), (5.1, False)])
 def test_boxes_match_from_a_dice_of_one_half(shift: float, found: bool):
     truth = rows(["1"])  # 10 wide: moved by 5, half of each is shared
-    said = truth.replace(boxes=truth.boxes + (shift, 0, shift, 0))
+    said = truth.replace(boxes=np.add(truth.boxes, (shift, 0, shift, 0)))
     assert etiseo(compare(said, truth)).m1 == found
 
 
