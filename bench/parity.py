@@ -32,7 +32,9 @@ from perdure.metrics import Score, score
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("PERDURE_DATA", ROOT.parent / "shared" / "data"))
+ENVIRONMENT = Path(os.environ.get("PERDURE_PEERS", ROOT / "bench/peers/.venv"))  # that of the peers
 RECORDED = ROOT / "tests/metrics/trackeval.json"
+SAME = 1e-6  # figures that differ by no more are equal
 NAMES_OF_MASKS = {"MOTSA": "MOTA", "MOTSP": "MOTP", "sMOTSA": "sMOTA"}
 
 
@@ -266,7 +268,7 @@ def compare_times(python: Path, size: tuple[int, int], repeat: int) -> tuple[flo
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--environment", type=Path, default=ROOT / "bench/peers/.venv")
+    parser.add_argument("--environment", type=Path, default=ENVIRONMENT, help="of the peers")
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--size", default="2000x30", help="frames x objects of the timed sequence")
     parser.add_argument("--repeat", type=int, default=3)
@@ -285,6 +287,8 @@ def main() -> None:
     )
     if arguments.json:
         print(json.dumps({"worst": worst, "ours_s": here, "trackeval_s": there, "ratio": here / there}))
+    if worst > SAME:
+        raise SystemExit(f"a figure differs from TrackEval's by {worst:.1e}, more than {SAME:.0e}")
 
 
 def compare_figures(python: Path) -> tuple[float, dict]:

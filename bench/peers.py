@@ -2,9 +2,9 @@
 
     python bench/peers.py [--sequences NAME ...] [--trackers NAME ...] [--environment DIR] [--write] [--json]
 
-The peers run in an environment of their own (made on first use by pip from bench/peers/requirements.txt), a process
-for each peer and settings: bench/peers/run.py. They are run twice, at their library's defaults and as their paper
-published; bench/peers/settings.toml says how. Our trackers run here at their defaults. Nobody is given pictures;
+The peers run in an environment of their own ($PERDURE_PEERS or bench/peers/.venv, made on first use by pip from
+bench/peers/requirements.txt), a process for each peer and settings: bench/peers/run.py. They are run twice, at their
+library's defaults and as their paper published; bench/peers/settings.toml says how. Our trackers run here at their defaults. Nobody is given pictures;
 our own get the silhouettes too where our detector made the regions. What a tracker says in a frame is scored as it
 is (ours: settled, the rows that count); the time is that of the update calls alone, after a warm-up, best of three.
 
@@ -48,6 +48,7 @@ from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Rows, Scene, Use
 
 HERE = Path(__file__).resolve().parent / "peers"
+ENVIRONMENT = Path(os.environ.get("PERDURE_PEERS") or HERE / ".venv")
 PAGE = HERE.parents[1] / "docs" / "benchmarks.md"
 HEADING, BEGINS, ENDS = (
     "## Against other trackers",
@@ -144,7 +145,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sequences", nargs="+", default=[], metavar="NAME", help="sequences or tables, by name")
     parser.add_argument("--trackers", nargs="+", default=[], metavar="NAME", help="trackers or libraries, by name")
-    parser.add_argument("--environment", type=Path, default=HERE / ".venv", metavar="DIR", help="of the peers")
+    parser.add_argument("--environment", type=Path, default=ENVIRONMENT, metavar="DIR", help="of the peers")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()

@@ -16,7 +16,7 @@ import pytest
 from perdure.metrics import score
 from perdure.types import Frame, Regions, Rows, Scene
 
-PYTHON = peers.HERE / ".venv" / "bin" / "python"
+PYTHON = peers.ENVIRONMENT / "bin" / "python"
 
 
 @pytest.fixture(name="run")
@@ -191,7 +191,7 @@ def test_an_environment_without_the_peers_is_named_with_a_remedy(tmp_path):
         peers.environment(tmp_path)
 
 
-@pytest.mark.skipif(not PYTHON.exists(), reason="bench/peers/.venv is not there; python bench/peers.py makes it")
+@pytest.mark.skipif(not PYTHON.exists(), reason="no environment of the peers; python bench/peers.py makes it")
 def test_a_real_peer_follows_a_walk():
     runner = next(one for one in peers.runners() if one.tracker == "pyxtrackers/bytetrack")
     outcome = peers.follow_there(runner, {"film": walk()}, PYTHON)["film"]

@@ -11,7 +11,7 @@ import pytest
 pytestmark = pytest.mark.skipif(
     not parity.DATA.is_dir(), reason=f"no sequences at {parity.DATA}; set PERDURE_DATA"
 )
-PEERS = parity.ROOT / "bench/peers/.venv/bin/python"
+PEERS = parity.ENVIRONMENT / "bin/python"
 
 
 @pytest.mark.parametrize("group", parity.groups(parity.DATA), ids=lambda group: group.name)
