@@ -132,6 +132,83 @@ def test_several_results_may_be_held_against_one_truth(tmp_path, truth, perdure_
     assert "together" not in done.stdout
 
 
+def test_two_trackers_over_several_sequences_are_two_groups(tmp_path, perdure_says):
+    for name in "ab":
+        write_text(tmp_path / f"truth/{name}.txt", WORLD.truth())
+        write_text(tmp_path / f"good/{name}.txt", WORLD.truth())
+        write_text(tmp_path / f"late/data/{name}.txt", late(WORLD.truth()))  # as TrackEval lays them out
+    done = perdure_says("score", "good", "late", "--truth", "truth", "--json")
+    assert [(one["group"], one["name"]) for one in done.value["sequences"]] == [
+        ("good", "a"), ("good", "b"), ("late", "a"), ("late", "b"),
+    ]  # fmt: skip
+    assert [done.value["groups"][name]["boxes"]["FN"] for name in ("good", "late")] == [0, 28]
+    shown = perdure_says("score", "good", "late", "--truth", "truth").stdout
+    assert "good/a " in shown
+    assert "late together" in shown
+
+
+@pytest.mark.parametrize(
+    ("results", "truths"),
+    [
+        (["a.txt", "x.txt"], ["b.txt", "a.txt"]),  # one name is known, the other not: in order would mix them up
+        (["several"], ["a.txt"]),  # a folder of sequences against the truth of one
+        (["a.txt", "x.txt"], ["a.txt", "b.txt", "c.txt"]),
+    ],
+)
+def test_names_that_are_known_in_part_are_not_guessed_at(tmp_path, perdure_says, results, truths):
+    for name in ("truth/a", "truth/b", "truth/c", "said/a", "said/x", "said/several/a", "said/several/b"):
+        write_text(tmp_path / f"{name}.txt", WORLD.truth())
+    places = [f"said/{name}" for name in results], [f"truth/{name}" for name in truths]
+    done = perdure_says("score", *places[0], "--truth", *places[1])
+    assert done.code == 2
+    assert "cannot tell which" in done.stderr
+
+
+def test_pairs_made_by_their_order_are_told(tmp_path, perdure_says):
+    for name in ("one", "two", "a", "b"):
+        write_text(tmp_path / f"{name}.txt", WORLD.truth())
+    done = perdure_says("score", "one.txt", "two.txt", "--truth", "a.txt", "b.txt")
+    assert "paired in their order: two.txt with b.txt" in done.stdout
+
+
+def test_a_text_may_have_any_name(tmp_path, truth, perdure_says):
+    write_text(tmp_path / "result.csv", WORLD.truth())
+    assert perdure_says("score", "result.csv", "--truth", truth, "--json").figures()["MOTA"] == 1.0
+
+
+def test_a_truth_of_which_nothing_is_asked_for_is_told(tmp_path, truth, perdure_says):
+    write_run(tmp_path / "run", WORLD.truth())
+    done = perdure_says("score", "run", "--truth", truth, "--protocol", "mot17")
+    assert "no row of " in done.stdout
+    assert "is asked for in these frames (as mot17; name another --protocol)" in done.stdout
+    assert "nothing was said" in perdure_says("score", "run", "--truth", truth, "--start", "90").stdout
+
+
+def test_a_run_that_was_broken_off_is_told(tmp_path, truth, perdure_says):
+    write_run(tmp_path / "run", WORLD.truth())
+    RunFolder(tmp_path / "run").write_about({"status": "interrupted", "frames": 40})
+    assert "run is interrupted: it ends after 38 frames" in perdure_says("score", "run", "--truth", truth).stdout
+    RunFolder(tmp_path / "run").write_about({"status": "done", "frames": 40})
+    assert "breaks off after 38 of 40 frames" in perdure_says("score", "run", "--truth", truth).stdout
+
+
+@pytest.mark.parametrize("value", ["x", None, [], 7.0])
+def test_a_run_json_with_a_wrong_value_is_named(tmp_path, truth, perdure_says, value):
+    write_run(tmp_path / "run", WORLD.truth())
+    RunFolder(tmp_path / "run").write_about({"reporting": {"report_confidence": value}})
+    done = perdure_says("score", "run", "--truth", truth)
+    assert done.code == 2
+    assert "run.json: report_confidence" in done.stderr
+
+
+def test_a_truth_of_another_size_is_of_another_video(tmp_path, truth, perdure_says):
+    write_run(tmp_path / "run", WORLD.truth())
+    (truth / "clip.json").write_text('{"events": [], "height": 480, "width": 640}')
+    done = perdure_says("score", "run", "--truth", truth)
+    assert done.code == 2
+    assert "run is of pictures of 120x80" in done.stderr
+
+
 def test_more_truths_than_results_are_told(tmp_path, perdure_says):
     for name in "abc":
         write_text(tmp_path / f"truth/{name}.txt", WORLD.truth())
@@ -147,7 +224,7 @@ def test_numbers_that_do_not_pair_are_refused(tmp_path, perdure_says):
     write_text(tmp_path / "y.txt", WORLD.truth())
     done = perdure_says("score", "x.txt", "y.txt", "--truth", "truth")
     assert done.code == 2
-    assert "no truth named 'x' among a, b, c" in done.stderr
+    assert "no truth 'x' among a, b, c" in done.stderr
 
 
 def test_the_truth_may_stand_first(tmp_path, truth, perdure_says):
@@ -171,7 +248,7 @@ def test_the_truth_may_stand_first(tmp_path, truth, perdure_says):
         (["nowhere", "--truth", "street"], "there is no nowhere"),
         (["street", "--truth", "street"], "street holds no result; wanted is a run folder"),
         (["run", "--truth", "run/tracks.jsonl"], "holds no truth"),
-        (["run", "--truth", "street", "--masks"], "run holds no silhouettes, only boxes; leave out --masks"),
+        (["run", "--truth", "street", "--masks"], "run holds no silhouettes, only boxes"),
         (["run", "--truth", "street", "--protocol", "mot99"], "mot99"),
         (["run", "--truth", "street", "--start", "0"], "start = '0' is no frame"),
         (["run", "--truth", "street", "--start", "9", "--end", "3"], "start (9) must not lie after end (3)"),
@@ -217,7 +294,7 @@ def test_rows_beyond_the_truth_are_told(tmp_path, perdure_says):
     tracks = WORLD.truth()
     write_text(tmp_path / "gt.txt", tracks.take(tracks.frames < 20))
     write_text(tmp_path / "said.txt", tracks)
-    assert "40 rows of said.txt lie before the first or after the last row" in (
+    assert "40 rows of said.txt lie in frames of which gt.txt has no row" in (
         perdure_says("score", "said.txt", "--truth", "gt.txt").stdout
     )
 

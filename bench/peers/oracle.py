@@ -17,7 +17,8 @@ import numpy as np
 from trackeval.datasets import MotChallenge2DBox, MOTSChallenge
 from trackeval.metrics import CLEAR, HOTA, Identity
 
-RATIOS = ("HOTA", "DetA", "AssA", "LocA", "MOTA", "MOTP", "sMOTA", "IDF1", "IDP", "IDR")
+RATIOS = ("HOTA", "DetA", "AssA", "LocA", "DetRe", "DetPr", "AssRe", "AssPr")
+RATIOS += ("MOTA", "MOTP", "sMOTA", "IDF1", "IDP", "IDR")
 COUNTS = {"CLR_TP": "TP", "CLR_FP": "FP", "CLR_FN": "FN"}
 COUNTS |= {name: name for name in ("IDSW", "Frag", "MT", "PT", "ML")}
 

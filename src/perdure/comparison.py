@@ -10,7 +10,7 @@ import numpy as np
 
 from perdure.draw import Mark
 from perdure.errors import FormatError, ParameterError
-from perdure.files.scored import Result, Truth, read_result, read_scored_truth
+from perdure.files.scored import Match, Result, Truth, read_result, read_scored_truth
 from perdure.files.span import shown
 from perdure.metrics.boundary import DavisScore, jaccard_and_boundary
 from perdure.metrics.clear import Pairs, pair, switches
@@ -57,9 +57,13 @@ class Comparison:
     report_confidence : float or None
         Of a run: from which confidence hidden targets counted.
     beyond : int
-        Rows of the result in frames before the first or after the last row of the truth.
+        Rows of the result in frames of which the truth has no row.
     has_groups : bool
         The result tells of events and groups, as a run does and text does not.
+    group : str
+        The argument that the result came from, where several hold the same sequences.
+    notes : tuple of str
+        What the reader must know of these two files.
     """
 
     name: str
@@ -75,6 +79,8 @@ class Comparison:
     report_confidence: float | None
     beyond: int
     has_groups: bool
+    group: str
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -105,17 +111,18 @@ def read_window(start: str | None, end: str | None) -> Window:
     return window
 
 
-def compare_files(name: str, result: Path, truth: Path, wanted: Wanted) -> Comparison:
-    """Score the result at one path against the truth at another.
+def compare_files(match: Match, wanted: Wanted) -> Comparison:
+    """Score a result against its truth.
 
     Raises
     ------
     FormatError
         For a file that is not what it should be, and where silhouettes are wanted and a side has none.
     """
-    true = read_scored_truth(truth, masks=wanted.masks, protocol=wanted.protocol)
+    true = read_scored_truth(match.truth, masks=wanted.masks, protocol=wanted.protocol)
     silhouettes = wanted.masks or true.boxes is None
-    said = read_result(result, masks=silhouettes, report_confidence=wanted.report_confidence)
+    said = read_result(match.result, masks=silhouettes, report_confidence=wanted.report_confidence)
+    _refuse_other_sizes(said, true)
     window = wanted.window
     laid = _lay_boxes(said, true, window), _lay_masks(said, true, window) if silhouettes else None
     main = laid[0] or laid[1] or compare(NO_ROWS, NO_ROWS)
@@ -123,9 +130,9 @@ def compare_files(name: str, result: Path, truth: Path, wanted: Wanted) -> Compa
     events = None if true.events is None else _events(true, window)
     sides = [side.frames for side in (main.truth, main.said) if len(side)]
     return Comparison(
-        name=name,
-        result=result,
-        truth=truth,
+        name=match.name,
+        result=match.result,
+        truth=match.truth,
         protocol=true.protocol,
         frames=(int(min(one[0] for one in sides)), int(max(one[-1] for one in sides))) if sides else None,
         boxes=score_compared(laid[0], pairs) if laid[0] else None,
@@ -134,8 +141,10 @@ def compare_files(name: str, result: Path, truth: Path, wanted: Wanted) -> Compa
         events=None if events is None else _score_events(said, true, events, main, pairs, window),
         mistakes=tuple(mistakes(main, pairs, merges_of(events or ()))) if wanted.mistakes else (),
         report_confidence=said.report_confidence,
-        beyond=_beyond(main),
+        beyond=_beyond(main, true),
         has_groups=said.tracks is not None,
+        group=match.group,
+        notes=(*said.notes, *_notes(main, true)),
     )
 
 
@@ -155,6 +164,7 @@ def marks_by_frame(run: Path, truth: Path, linger: int) -> dict[int, list[Mark]]
         For a file that is not what it should be.
     """
     said, true = read_result(run, masks=False), read_scored_truth(truth, masks=False)
+    _refuse_other_sizes(said, true)
     rows = true.boxes if true.boxes is not None else true.masks
     compared = compare(said.boxes, NO_ROWS if rows is None else rows)
     pairs = pair(compared, LEAST_OVERLAP)
@@ -192,17 +202,40 @@ def _lay_boxes(said: Result, true: Truth, window: Window) -> Compared | None:
 
 def _lay_masks(said: Result, true: Truth, window: Window) -> Compared:
     rows = _silhouettes(said.masks, said.path), _silhouettes(true.masks, true.path)
-    sizes = {one.size for one in rows if one.size is not None}
-    if len(sizes) > 1:
-        (a, b), (c, d) = (one.size or (0, 0) for one in rows)
-        raise FormatError(f"{said.path} is of pictures of {b}x{a}, {true.path} of {d}x{c}: not of the same video")
     return compare(*(_inside(one, window) for one in rows), masks=True)
 
 
 def _silhouettes(rows: Rows | None, path: Path) -> Rows:
     if rows is None or (len(rows) and not rows.masks):
-        raise FormatError(f"{path} holds no silhouettes, only boxes; leave out --masks")
+        raise FormatError(
+            f"{path} holds no silhouettes, only boxes; silhouettes are compared with --masks, or where"
+            " a truth holds nothing else"
+        )
     return rows
+
+
+def _refuse_other_sizes(said: Result, true: Truth) -> None:
+    """Refuse two sides whose pictures are known to differ in size."""
+    here = next((one.size for one in (said.boxes, said.masks) if one is not None and one.size), None)
+    there = next((one.size for one in (true.boxes, true.masks) if one is not None and one.size), None)
+    if here and there and here != there:
+        raise FormatError(
+            f"{said.path} is of pictures of {here[1]}x{here[0]}, {true.path} of {there[1]}x{there[0]}:"
+            " not of the same video"
+        )
+
+
+def _notes(compared: Compared, true: Truth) -> list[str]:
+    """What is empty, and why."""
+    notes = []
+    rows = true.boxes if true.boxes is not None else true.masks
+    if not len(compared.truth):
+        why = f"as {true.protocol}" if rows is not None and len(rows) else "it is empty"
+        hint = "; name another --protocol" if rows is not None and len(rows) and true.boxes is not None else ""
+        notes.append(f"no row of {true.path} is asked for in these frames ({why}{hint}): all figures are 0")
+    if not len(compared.said):
+        notes.append("nothing was said in these frames")
+    return notes
 
 
 def _davis(said: Result, true: Truth, window: Window) -> DavisScore:
@@ -235,9 +268,9 @@ def _inside(rows: Rows, window: Window) -> Rows:
     return rows.between(window.first, window.last)
 
 
-def _beyond(compared: Compared) -> int:
-    truth, said = compared.truth.frames, compared.said.frames
-    return int(np.count_nonzero((said < truth[0]) | (said > truth[-1]))) if len(truth) else 0
+def _beyond(compared: Compared, true: Truth) -> int:
+    known = compared.truth.frames if true.pictures is None else np.array(true.pictures, np.int64)
+    return int(np.count_nonzero(~np.isin(compared.said.frames, known)))
 
 
 def _bound(name: str, given: str | None, past: int) -> int | None:

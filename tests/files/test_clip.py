@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from perdure.errors import FormatError
-from perdure.files.clip import read_blobs, read_clip_events
+from perdure.files.clip import read_blobs, read_clip
 from perdure.types import Event
 
 
@@ -24,7 +24,19 @@ def test_moments_and_stretches_of_objects_are_read_and_others_left_out(tmp_path:
         {"type": "full_occlusion", "begin": 110, "end": 126, "ids": [1]},
         {"type": "light", "begin": 3, "end": 4},
     )
-    assert read_clip_events(path) == (Event("merge", 88, 88, (1, 2)), Event("full_occlusion", 109, 125, (1,)))
+    assert read_clip(path)[0] == (Event("merge", 88, 88, (1, 2)), Event("full_occlusion", 109, 125, (1,)))
+
+
+def test_the_size_of_the_pictures_is_told_where_the_clip_says_it(tmp_path: Path):
+    (tmp_path / "clip.json").write_text('{"events": [], "height": 480, "width": 640}')
+    assert read_clip(tmp_path / "clip.json") == ((), (480, 640))
+    (tmp_path / "clip.json").write_text('{"events": [], "height": "480"}')
+    assert read_clip(tmp_path / "clip.json") == ((), None)
+
+
+def test_a_merge_of_fewer_than_two_is_none(tmp_path: Path):
+    events = [{"type": "merge", "frame": 9, "ids": ids} for ids in ([], [1], [1, 1], [1, 2])]
+    assert [one.ids for one in read_clip(clip(tmp_path, *events))[0]] == [(1, 2)]
 
 
 @pytest.mark.parametrize(
@@ -34,14 +46,14 @@ def test_moments_and_stretches_of_objects_are_read_and_others_left_out(tmp_path:
 def test_a_malformed_event_is_named(tmp_path: Path, event: object):
     good = {"type": "merge", "frame": 89, "ids": [1, 2]}
     with pytest.raises(FormatError, match=r"clip\.json, event 2: wanted are"):
-        read_clip_events(clip(tmp_path, good, event))
+        read_clip(clip(tmp_path, good, event))
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"events": 3}', "{"])
 def test_what_is_no_clip_is_refused(tmp_path: Path, text: str):
     (tmp_path / "clip.json").write_text(text)
     with pytest.raises(FormatError, match=r"clip\.json"):
-        read_clip_events(tmp_path / "clip.json")
+        read_clip(tmp_path / "clip.json")
 
 
 def test_blobs_are_sets_of_ids_by_frame(tmp_path: Path):

@@ -60,6 +60,13 @@ def test_one_event_of_three_people_stands_for_its_pairs():
     assert score.merges == Tally(true=2, said=1, found=2, right=1)
 
 
+def test_a_true_event_of_three_people_is_its_pairs_too():
+    three = identities([*KEPT, "c" * 30], [*TRUTH, "3" * 30])
+    truth = (Event("merge", 10, 10, (49, 50, 51)),)
+    assert score_events([Event("merge", 10, 10, (97, 98, 99))], truth, three).merges == Tally(3, 1, 3, 1)
+    assert score_events([Event("merge", 10, 10, (97, 98))], truth, three).merges == Tally(3, 1, 1, 1)
+
+
 def test_splits_and_total_occlusions_are_told_by_their_own_kinds():
     truth = (*MEETING, Event("full_occlusion", 20, 25, (49,)))
     score = told(Event("split", 17, 17, (97, 98)), Event("occluded", 20, 25, (97,)), truth=truth)
@@ -161,6 +168,11 @@ def test_stretches_lost_and_invented_stand_worst_first():
 def test_a_wrong_resolution_is_told_with_its_merge():
     found = faults(SWAPPED, merges=tuple(merges_of(MEETING)))
     assert ("resolution", 10, 16, 14) in found
+    compared = compare(rows(SWAPPED), rows(TRUTH))
+    (text,) = (
+        one.text for one in mistakes(compared, pair(compared), merges_of(MEETING)) if one.kind == "resolution"
+    )
+    assert text == "after the merge of 49 and 50 up to frame 16: 49 was 97 and is 98, 50 was 98 and is 97"
     assert "resolution" not in [kind for kind, *_ in faults(KEPT, merges=tuple(merges_of(MEETING)))]
 
 

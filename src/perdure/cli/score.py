@@ -16,7 +16,7 @@ from perdure.comparison import Comparison, Wanted, compare_files, read_window
 from perdure.errors import ParameterError, PerdureError
 from perdure.files.mot import PROTOCOLS
 from perdure.files.runs import Reporting
-from perdure.files.scored import find_results, find_truths, paired
+from perdure.files.scored import Match, find_results, find_truths, name_of, paired
 from perdure.metrics.boundary import DavisScore
 from perdure.metrics.events import EventScore, Tally
 from perdure.metrics.mistakes import Mistake
@@ -26,9 +26,9 @@ TOGETHER = "together"
 SHOWN = 30  # mistakes of the list; --json has all
 _PROTOCOLS = {
     "mot15": "MOT15: rows of the truth with flag 0 are not asked for; a row said on one is wrong",
-    "mot17": "MOT17: pedestrians with flag 1; rows said on a distractor (class 2, 7, 8, 12) are taken away",
-    "mot20": "MOT20: pedestrians with flag 1; rows said on a distractor (class 2, 6, 7, 8, 12) are taken away",
-    "mots": "MOTS: rows said for more than half in an ignored area (class 10), and on nothing else, are taken away",
+    "mot17": "MOT17: pedestrians whose flag is not 0; rows said on a distractor (class 2, 7, 8, 12) are taken away",
+    "mot20": "MOT20: pedestrians whose flag is not 0; rows said on a distractor (class 2, 6, 7, 8, 12) are taken away",
+    "mots": "MOTS: objects of all classes alike; rows said for more than half in an ignored area (class 10), and on nothing else, are taken away",
     "masks": "index PNGs: every object of the truth counts; 255 is void where it is not the only value",
 }
 
@@ -117,15 +117,15 @@ def score(
         raise ParameterError(params.unknown_name("protocol", protocol, known))
     results, truth = _both(results or [], truth or [])
     wanted = Wanted(masks, errors, read_window(start, end), protocol, _confidence(chosen))
-    found_results, found_truths = find_results(results), find_truths(truth)
-    jobs = paired(found_results, found_truths)
-    several = len({place for _, _, place in jobs}) == len(jobs) > 1
-    comparisons = [_compare(*job, wanted) for job in jobs]
-    without = [] if len(found_truths) == 1 else _left_out(jobs, found_truths)
+    found = {str(path): find_results(path) for path in dict.fromkeys(results)}
+    truths = find_truths(dict.fromkeys(truth))
+    comparisons = [_compare(match, wanted) for match in paired(found, truths)]
+    used = {one.truth for one in comparisons}
+    without = [] if len(truths) == 1 else [name for name, path in truths if path not in used]
     if json_:
-        print(json.dumps(_value(comparisons, several, without)))
+        print(json.dumps(_value(comparisons, without, wanted)))
     else:
-        print("\n\n".join(_page(comparisons, several, without, wanted)))
+        print("\n\n".join(_page(comparisons, without, wanted)))
 
 
 def _both(results: list[Path], truths: list[Path]) -> tuple[list[Path], list[Path]]:
@@ -144,37 +144,49 @@ def _confidence(chosen: Mapping[str, object]) -> float | None:
     return float(value) if isinstance(value, float) else None
 
 
-def _compare(name: str, result: Path, truth: Path, wanted: Wanted) -> Comparison:
+def _compare(match: Match, wanted: Wanted) -> Comparison:
     try:
-        return compare_files(name, result, truth, wanted)
+        return compare_files(match, wanted)
     except ValueError as error:
-        raise PerdureError(f"{result} against {truth}: {error}") from error
+        raise PerdureError(f"{match.result} against {match.truth}: {error}") from error
 
 
-def _left_out(jobs: Sequence[tuple[str, Path, Path]], truths: Sequence[tuple[str, Path]]) -> list[str]:
-    used = {truth for _, _, truth in jobs}
-    return [name for name, path in truths if path not in used]
+def _together(comparisons: Sequence[Comparison]) -> dict[str, list[Comparison]]:
+    """The sequences of each group that has several, by the name of their row."""
+    groups: dict[str, list[Comparison]] = {}
+    for one in comparisons:
+        groups.setdefault(one.group, []).append(one)
+    return {
+        f"{group} {TOGETHER}".strip(): parts
+        for group, parts in groups.items()
+        if len({one.truth for one in parts}) == len(parts) > 1
+    }
 
 
-def _value(comparisons: Sequence[Comparison], several: bool, without: Sequence[str]) -> dict[str, Any]:
-    value: dict[str, Any] = {"sequences": [_sequence(one) for one in comparisons]}
-    if several:
-        value[TOGETHER] = _families(comparisons)
+def _value(comparisons: Sequence[Comparison], without: Sequence[str], wanted: Wanted) -> dict[str, Any]:
+    value: dict[str, Any] = {"sequences": [_sequence(one, wanted) for one in comparisons]}
+    joined = {name: _families(parts) for name, parts in _together(comparisons).items()}
+    if list(joined) == [TOGETHER]:
+        value[TOGETHER] = joined[TOGETHER]
+    elif joined:
+        value["groups"] = {name.removesuffix(f" {TOGETHER}"): figures for name, figures in joined.items()}
     return value | {"without_result": list(without)}
 
 
-def _sequence(one: Comparison) -> dict[str, Any]:
+def _sequence(one: Comparison, wanted: Wanted) -> dict[str, Any]:
     about: dict[str, Any] = {
         "name": one.name,
+        **({"group": one.group} if one.group else {}),
         "result": str(one.result),
         "truth": str(one.truth),
         "protocol": one.protocol,
         "frames": None if one.frames is None else [frame + 1 for frame in one.frames],
         "report_confidence": one.report_confidence,
         "rows_beyond_truth": one.beyond,
+        "notes": list(one.notes),
         **_families([one]),
     }
-    return about | {"errors": [_mistake(fault) for fault in one.mistakes]}
+    return about | ({"errors": [_mistake(fault) for fault in one.mistakes]} if wanted.mistakes else {})
 
 
 def _families(parts: Sequence[Comparison]) -> dict[str, Any]:
@@ -226,12 +238,11 @@ def _mistake(fault: Mistake) -> dict[str, Any]:
     }
 
 
-def _page(comparisons: Sequence[Comparison], several: bool, without: Sequence[str], wanted: Wanted) -> list[str]:
+def _page(comparisons: Sequence[Comparison], without: Sequence[str], wanted: Wanted) -> list[str]:
     """The tables, the mistakes, and what the figures rest on."""
     names = _names(comparisons)
     rows = {name: _families([one]) for name, one in zip(names, comparisons, strict=True)}
-    if several:
-        rows[TOGETHER] = _families(comparisons)
+    rows |= {name: _families(parts) for name, parts in _together(comparisons).items()}
     parts = []
     for family, titles in (
         ("boxes", {"boxes, %": tables.BOXES, "counts": tables.COUNTS, "ETISEO, %": tables.ETISEO}),
@@ -248,11 +259,9 @@ def _page(comparisons: Sequence[Comparison], several: bool, without: Sequence[st
 
 
 def _names(comparisons: Sequence[Comparison]) -> list[str]:
-    """A name for each row of a table: that of the sequence, or of the result where several have the same."""
-    names = [one.name for one in comparisons]
-    if len(set(names)) == len(names):
-        return names
-    return [str(one.result) for one in comparisons]
+    """A name for each row of a table: that of the sequence, in its group; or of the result where these are alike."""
+    names = [f"{one.group}/{one.name}" if one.group else one.name for one in comparisons]
+    return names if len(set(names)) == len(names) else [str(one.result) for one in comparisons]
 
 
 _EVENT_HEADING = ("events", "merges P", "R", "splits P", "R", "total occl. P", "R", "one blob P", "R", "ids back")
@@ -284,7 +293,7 @@ def _list(name: str, faults: Sequence[Mistake]) -> str:
         for fault in faults[:SHOWN]
     ]
     lines = tables.aligned(
-        [row[:4] for row in [["mistake", "frame", "rows", "box x1 y1 x2 y2"], *rows]]
+        [row[:4] for row in [["mistake", "frame", "rows", "box x1 y1 x2 y2, from 0"], *rows]]
     ).splitlines()
     texts = ["", *(row[4] for row in rows)]
     counted = ", ".join(
@@ -310,18 +319,23 @@ def _notes(comparisons: Sequence[Comparison], without: Sequence[str], wanted: Wa
         lines.append("rows of text and pictures: all count, whatever their confidence")
     lines += [_PROTOCOLS[one] for one in dict.fromkeys(one.protocol for one in comparisons)]
     lines.append(
-        f"a match needs IoU ≥ {LEAST_OVERLAP:g} (HOTA: mean over .05 to .95; ETISEO: Dice ≥ {LEAST_DICE:g}); frames, in the"
-        " list of mistakes too, count from 1"
+        f"a match needs IoU ≥ {LEAST_OVERLAP:g} (HOTA: mean over .05 to .95; ETISEO: Dice ≥ {LEAST_DICE:g}); frames count"
+        " from 1, as in text (films and run logs: from 0)"
     )
     if any(one.events for one in comparisons):
         lines.append(
             "events match within 5 frames, of the same objects; 'ids back': merges after which all ids are as before"
         )
-    spans = [one.frames for one in comparisons if one.frames]
-    if spans:
-        lines.append(f"frames {min(one[0] for one in spans) + 1} to {max(one[1] for one in spans) + 1}")
+    if len(comparisons) == 1 and (span := comparisons[0].frames):
+        lines.append(f"frames {span[0] + 1} to {span[1] + 1}")
     lines += [
-        f"note: {one.beyond} rows of {one.result} lie before the first or after the last row of {one.truth}"
+        f"paired in their order: {one.result} with {one.truth}"
+        for one in comparisons
+        if name_of(one.result) != name_of(one.truth) and len({other.truth for other in comparisons}) > 1
+    ]
+    lines += [f"note: {note}" for note in dict.fromkeys(note for one in comparisons for note in one.notes)]
+    lines += [
+        f"note: {one.beyond} rows of {one.result} lie in frames of which {one.truth} has no row; they are wrong"
         for one in comparisons
         if one.beyond
     ]

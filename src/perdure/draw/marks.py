@@ -18,7 +18,7 @@ from perdure.draw.labels import Label
 from perdure.draw.strokes import Stroke, Style, broken, whole
 
 RED = (255, 64, 48)
-LEGEND = "against the truth: dashed = missed, crossed = matches nothing, 3 → 7 = new id"
+LEGEND = "red: dashed = missed (true id), crossed = matches nothing, 3 → 7 = new id"
 
 
 class Mark(NamedTuple):

@@ -15,8 +15,11 @@ _MOMENTS = ("merge", "split", "enter", "leave")
 _STRETCHES = ("full_occlusion", "occluded", "behind", "in_front", "stands")
 
 
-def read_clip_events(path: Path) -> tuple[Event, ...]:
-    """Return the events of a `clip.json`, frames counted from 0; others than of objects are left out.
+def read_clip(path: Path) -> tuple[tuple[Event, ...], tuple[int, int] | None]:
+    """Return the events of a `clip.json` and, where it says, the height and width of the pictures.
+
+    Frames count from 0 here; events of other things than objects, and merges or splits of fewer than two, are left
+    out.
 
     A split or leave stands at the first frame after it.
 
@@ -26,10 +29,11 @@ def read_clip_events(path: Path) -> tuple[Event, ...]:
         Naming file and event.
     """
     try:
-        events = json.loads(path.read_text(encoding="utf-8-sig"))["events"]
+        clip = json.loads(path.read_text(encoding="utf-8-sig"))
+        events, size = clip["events"], (clip.get("height"), clip.get("width"))
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FormatError(f"{path} is no description of a clip: wanted is a JSON object with 'events'") from error
     if not isinstance(events, list):
         raise FormatError(f"{path}: 'events' must be a list, not {shown(events)}")
@@ -42,7 +46,8 @@ def read_clip_events(path: Path) -> tuple[Event, ...]:
             raise FormatError(
                 f"{path}, event {number}: wanted are 'type', 'frame' or 'begin' and 'end', and 'ids'"
             ) from error
-    return tuple(found)
+    told = (size[0], size[1]) if isinstance(size[0], int) and isinstance(size[1], int) else None
+    return tuple(one for one in found if len(set(one.ids)) >= (2 if one.kind in ("merge", "split") else 1)), told
 
 
 def read_blobs(path: Path) -> Mapping[int, tuple[frozenset[int], ...]]:

@@ -49,7 +49,7 @@ def read_tracks(path: Path, fps: float = 25.0) -> Tracks:
     )
 
 
-def read_said(path: Path) -> Rows:
+def read_said(path: str | Path) -> Rows:
     """Return the rows of a MOTChallenge result file for scoring; whatever their confidence, all count.
 
     Raises
@@ -61,18 +61,18 @@ def read_said(path: Path) -> Rows:
     return _rows(table, np.zeros(len(table.values), np.int8))
 
 
-def read_truth(path: Path, protocol: str = "auto") -> Rows:
+def read_truth(path: str | Path, protocol: str = "auto") -> Rows:
     """Return the rows of a MOTChallenge truth, each marked as the benchmark uses it.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Of the text.
     protocol : 'auto', 'mot15', 'mot17' or 'mot20'
         'mot15': rows whose 7th column (the flag) is 0 are not asked for. 'mot17': the 8th column is a class; only
         pedestrians (1) are asked for, and rows said on a person on a vehicle (2), a static person (7), a
         distractor (8) or a reflection (12) are excused. 'mot20': on other vehicles (6) as well. 'auto': 'mot17'
-        for nine columns of which the 8th is always a class from 1 to 13, else 'mot15'.
+        for nine columns of which the 8th is always a class from 1 to 13, and 1 at least once, else 'mot15'.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def protocol_of(table: MotTable) -> str:
     """Return the protocol that a truth's columns speak of: 'mot17' or 'mot15'."""
     kinds = table.column(7, -1.0)
     classes = table.values.shape[1] == 9 and np.isin(kinds, np.arange(1, _LAST_CLASS + 1)).all()
-    return "mot17" if classes and len(kinds) else "mot15"
+    return "mot17" if classes and (kinds == _PEDESTRIAN).any() else "mot15"
 
 
 def read_detections(path: Path) -> Mapping[int, Regions]:
@@ -116,12 +116,12 @@ def read_detections(path: Path) -> Mapping[int, Regions]:
 
 
 def _use(table: MotTable, protocol: str) -> NDArray[np.int8]:
-    flagged = table.column(6, 1.0) == 0
+    flagged = np.trunc(table.column(6, 1.0)) == 0
     if protocol == "mot15":
         return np.where(flagged, Use.IGNORED, Use.SCORED).astype(np.int8)
-    if table.values.shape[1] < 8:
+    if table.values.shape[1] < 8 and len(table.values):
         raise FormatError(f"{table.path} has no class in an 8th column, which {protocol} wants; score it as mot15")
-    kind = table.values[:, 7]
+    kind = table.column(7, -1.0)
     use = np.where(flagged | (kind != _PEDESTRIAN), Use.IGNORED, Use.SCORED)
     return np.where(np.isin(kind, _DISTRACTORS[protocol]), Use.DISTRACTOR, use).astype(np.int8)
 

@@ -33,7 +33,7 @@ class MotTable(NamedTuple):
         return np.full(len(self.values), default)
 
 
-def read_table(path: Path) -> MotTable:
+def read_table(path: str | Path) -> MotTable:
     """Return the numbers of a MOTChallenge file; commas or blanks between them.
 
     Raises
@@ -41,6 +41,7 @@ def read_table(path: Path) -> MotTable:
     FormatError
         Naming file and line, for a line that is no such row.
     """
+    path = Path(path)
     lines = read_lines(path)
     values = _quickly(lines)
     if values is not None and len(values) == len(lines):
@@ -73,6 +74,8 @@ def _quickly(lines: list[str]) -> NDArray[np.float64] | None:
     except ValueError:
         return None
     if values.shape[1] < 6 or not np.isfinite(values).all():
+        return None
+    if np.abs(values[:, 2:6]).max() > 4 * FARTHEST:
         return None
     frame, corner, size = values[:, 0], values[:, 2:4] - 1.0, values[:, 4:6]
     good = (frame >= 1) & (frame <= _LAST) & (frame == np.floor(frame)) & (size >= 0).all(axis=1)

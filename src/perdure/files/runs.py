@@ -167,20 +167,22 @@ class RunFolder:
         """Yield (frame, settled rows), all statuses, groups too; memory stays bounded."""
         return settle_by_frame(lambda: (entry.report for entry in read_log(self.log)))
 
-    def tracks(self, *, with_masks: bool = True) -> Tracks:
-        """Return all settled rows at once; without silhouettes, which is faster, where nobody needs them."""
-        return settle(entry.report for entry in read_log(self.log, with_masks=with_masks))
+    def tracks(self) -> Tracks:
+        """Return all settled rows at once."""
+        return settle(entry.report for entry in read_log(self.log))
 
-    def events(self) -> tuple[Event, ...]:
-        """Return all events with their settled ids; those whose ids were all dropped are left out."""
-        entries = [entry.report for entry in read_log(self.log, with_masks=False)]
-        corrections = Corrections.of(entries)
+    def read(self, *, with_masks: bool = True) -> tuple[Tracks, tuple[Event, ...], int]:
+        """Return all settled rows, all events with their settled ids, and how many frames the log holds."""
+        entries = list(read_log(self.log, with_masks=with_masks))
+        reports = [entry.report for entry in entries]
+        corrections = Corrections.of(reports)
         settled = [
             (event, corrections.event(event, number))
-            for number, report in enumerate(entries)
+            for number, report in enumerate(reports)
             for event in report.events
         ]
-        return tuple(after for before, after in settled if after.ids or not before.ids)
+        events = tuple(after for before, after in settled if after.ids or not before.ids)
+        return settle(reports), events, sum(entry.frame >= 0 for entry in entries)
 
     def write_results(self, reporting: Reporting) -> Totals:
         """Settle the log into `tracks.txt` and `events.csv`, streaming."""

@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from perdure import params
 from perdure.errors import FormatError, ParameterError
 from perdure.files import mask_pngs, mots
-from perdure.files.clip import read_blobs, read_clip_events
+from perdure.files.clip import read_blobs, read_clip
 from perdure.files.images import natural_order
 from perdure.files.mot import protocol_of, read_said, read_truth
 from perdure.files.mot_table import read_lines, read_table
-from perdure.files.runs import RunFolder
+from perdure.files.runs import Reporting, RunFolder
 from perdure.types import Event, Rows, Tracks
 
 _BOXES, _VISIBLE, _CLIP, _BLOBS = "gt/gt.txt", "gt/visible.txt", "clip.json", "gt/blobs.txt"
@@ -33,6 +34,8 @@ class Result:
         Of a run: all its rows, those of groups too, and its events; None of anything else.
     report_confidence : float or None
         Of a run: from which confidence hidden targets count.
+    notes : tuple of str
+        What the reader must know: that a run is not complete.
     """
 
     path: Path
@@ -41,6 +44,7 @@ class Result:
     tracks: Tracks | None = None
     events: tuple[Event, ...] | None = None
     report_confidence: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +71,31 @@ class Truth:
     pictures: tuple[int, ...] | None = None
 
 
-def find_results(paths: Iterable[Path]) -> list[tuple[str, Path]]:
-    """Return (name, path) of every result at the paths; a folder of several is opened.
+@dataclass(frozen=True)
+class Match:
+    """A result and its truth; `group` is the argument that it came from, where several hold the same sequences."""
+
+    name: str
+    result: Path
+    truth: Path
+    group: str = ""
+
+
+Named = tuple[str, Path]
+
+
+def find_results(path: Path) -> list[Named]:
+    """Return (name, path) of every result at a path; a folder of several is opened.
 
     Raises
     ------
     FormatError
-        If there is none at a path.
+        If there is none.
     """
-    return [one for path in paths for one in _find(path, _is_result, "result")]
+    return _find(path, _is_result, "result")
 
 
-def find_truths(paths: Iterable[Path]) -> list[tuple[str, Path]]:
+def find_truths(paths: Iterable[Path]) -> list[Named]:
     """Return (name, path) of every truth at the paths; a folder of several is opened.
 
     Raises
@@ -89,29 +106,36 @@ def find_truths(paths: Iterable[Path]) -> list[tuple[str, Path]]:
     return [one for path in paths for one in _find(path, _is_truth, "truth")]
 
 
-def paired(
-    results: Sequence[tuple[str, Path]], truths: Sequence[tuple[str, Path]]
-) -> list[tuple[str, Path, Path]]:
-    """Return (name, result, truth): by equal names, else in order, else all results against the one truth.
+def paired(results: Mapping[str, Sequence[Named]], truths: Sequence[Named]) -> list[Match]:
+    """Pair results, by the argument that they came from, with truths.
+
+    By names where all have one that a truth has too; where several arguments hold the same names, each is a group
+    of its own. Several arguments may be held against one truth. Only where no name is that of a truth are as many
+    results and truths paired in their order.
 
     Raises
     ------
     ParameterError
         If none of these can be done.
     """
-    by_name = dict(truths)
-    names = [name for name, _ in results]
-    if len(by_name) == len(truths) and len(set(names)) == len(names) and set(names) <= set(by_name):
-        return [(name, path, by_name[name]) for name, path in results]
-    if len(results) == len(truths):
-        return [(name, path, truth) for (_, path), (name, truth) in zip(results, truths, strict=True)]
-    if len(truths) == 1:
-        return [(name, path, truths[0][1]) for name, path in results]
-    lost = next((name for name in names if name not in by_name), names[0])
-    known = ", ".join(sorted(by_name)[:8])
+    by_name, every = dict(truths), [(group, *one) for group, several in results.items() for one in several]
+    names = [name for _, name, _ in every]
+    known = [name in by_name for name in names] if len(by_name) == len(truths) else [False] * len(names)
+    if all(known):
+        if len(set(names)) == len(names):
+            return [Match(name, path, by_name[name]) for _, name, path in every]
+        if all(len(dict(several)) == len(several) for several in results.values()):
+            return [Match(name, path, by_name[name], group) for group, name, path in every]
+    if len(truths) == 1 and all(len(several) == 1 for several in results.values()):
+        alone = [truths[0][0]] if len(every) == 1 else names
+        return [Match(name, path, truths[0][1]) for name, (_, _, path) in zip(alone, every, strict=True)]
+    if not any(known) and len(every) == len(truths):
+        return [Match(name, path, truth) for (_, _, path), (name, truth) in zip(every, truths, strict=True)]
+    lost = next((name for name, one in zip(names, known, strict=True) if not one), names[0])
+    shown = ", ".join(sorted(by_name)[:8]) + (", …" if len(by_name) > 8 else "")
     raise ParameterError(
-        f"{len(results)} results and {len(truths)} truths: give as many of both, in the same order, or name them"
-        f" alike; there is no truth named {lost!r} among {known}"
+        f"cannot tell which of {len(every)} results belongs to which of {len(truths)} truths: name them alike (there is"
+        f" no truth {lost!r} among {shown}), or give as many of both under other names, in the same order"
     )
 
 
@@ -157,14 +181,14 @@ def read_scored_truth(path: Path, *, masks: bool, protocol: str = "auto") -> Tru
         return Truth(path, None, mask_pngs.read_masks(path, void=True), "masks", pictures=tuple(pictures))
     home = boxes.parent.parent if boxes.parent.name == "gt" else boxes.parent
     clip, blobs = home / _CLIP, home / _BLOBS
-    events = read_clip_events(clip) if clip.is_file() else None
+    events, size = read_clip(clip) if clip.is_file() else (None, None)
     shared = read_blobs(blobs) if blobs.is_file() else None
     if is_mots(boxes):
         return Truth(path, None, mots.read_masks(boxes), "mots", events, shared)
     visible = home / _VISIBLE
     seen = mots.read_masks(visible) if masks and visible.is_file() else None
     used = protocol_of(read_table(boxes)) if protocol == "auto" else protocol
-    return Truth(path, read_truth(boxes, used), seen, used, events, shared)
+    return Truth(path, read_truth(boxes, used).replace(size=size), seen, used, events, shared)
 
 
 def is_mots(path: Path) -> bool:
@@ -175,25 +199,39 @@ def is_mots(path: Path) -> bool:
 
 
 def _read_run(folder: RunFolder, masks: bool, report_confidence: float | None) -> Result:
-    told = folder.read_about().get("reporting", {}).get("report_confidence", 0.5)
-    least = told if report_confidence is None else report_confidence
-    tracks = folder.tracks(with_masks=masks)
-    counted = Rows.of_tracks(tracks.counted(least))
-    size = tuple(folder.read_about().get(name) for name in ("height", "width"))
-    if all(isinstance(one, int) for one in size):
-        counted = counted.replace(size=size)
-    return Result(folder.path, counted, counted if masks else None, tracks, folder.events(), least)
+    about = folder.read_about()
+    given = {} if report_confidence is None else {"report_confidence": report_confidence}
+    try:
+        least = params.build(Reporting, {**about.get("reporting", {}), **given}).report_confidence
+    except ParameterError as error:
+        raise FormatError(f"{folder.path / 'run.json'}: {error}") from error
+    tracks, events, frames = folder.read(with_masks=masks)
+    counted = Rows.of_tracks(tracks.counted(least)).replace(size=_size(about))
+    notes = []
+    if about.get("status", "done") != "done":
+        notes.append(f"{folder.path} is {about['status']}: it ends after {frames} frames")
+    elif isinstance(about.get("frames"), int) and frames < about["frames"]:
+        notes.append(f"the log of {folder.path} breaks off after {frames} of {about['frames']} frames")
+    return Result(folder.path, counted, counted if masks else None, tracks, events, least, tuple(notes))
+
+
+def _size(about: Mapping[str, object]) -> tuple[int, int] | None:
+    """Height and width, where both are told."""
+    height, width = about.get("height"), about.get("width")
+    return (height, width) if isinstance(height, int) and isinstance(width, int) else None
 
 
 def _find(path: Path, is_one: Callable[[Path], bool], what: str) -> list[tuple[str, Path]]:
     if path.name == "tracks.jsonl" and path.is_file():
         path = path.parent
-    if is_one(path):
-        return [(_name(path), path)]
     if not path.exists():
         raise FormatError(f"there is no {path}")
-    inside = sorted(path.iterdir(), key=natural_order) if path.is_dir() else []
-    found = [(_name(one), one) for one in inside if not one.name.startswith(".") and is_one(one)]
+    if is_one(path) or not path.is_dir():
+        return [(name_of(path), path)]
+    if not any(is_one(one) for one in path.iterdir()) and (path / "data").is_dir():
+        path = path / "data"  # as TrackEval lays out a tracker's results
+    inside = sorted(path.iterdir(), key=natural_order)
+    found = [(name_of(one), one) for one in inside if not one.name.startswith(".") and is_one(one)]
     if not found:
         wanted = "a run folder, MOT or MOTS text, or a folder of index PNGs" + (
             "" if what == "result" else ", or a folder with gt/gt.txt"
@@ -205,13 +243,13 @@ def _find(path: Path, is_one: Callable[[Path], bool], what: str) -> list[tuple[s
 def _is_result(path: Path) -> bool:
     if path.is_dir():
         return (path / "tracks.jsonl").is_file() or any(path.glob("*.png"))
-    return path.is_file() and path.suffix == ".txt"
+    return path.suffix == ".txt"
 
 
 def _is_truth(path: Path) -> bool:
     if path.is_dir():
         return _in_folder(path) is not None or any(path.glob("*.png"))
-    return path.is_file() and path.suffix == ".txt"
+    return path.suffix == ".txt"
 
 
 def _in_folder(folder: Path) -> Path | None:
@@ -222,7 +260,8 @@ def _in_folder(folder: Path) -> Path | None:
     return None
 
 
-def _name(path: Path) -> str:
+def name_of(path: Path) -> str:
+    """Return the name of the sequence that a result or truth is of."""
     if path.is_dir():
         return path.parent.name if path.name == "gt" else path.resolve().name
     stem = path.name.removesuffix(path.suffix).removesuffix(".gt")

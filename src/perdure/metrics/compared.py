@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +37,7 @@ class Compared:
     truth: Rows
     moments: tuple[Moment, ...]
     excused: int  # said rows taken away because they lie on what is not asked for
+    masks: bool = False  # the overlaps are those of silhouettes
 
     @property
     def true_ids(self) -> NDArray[np.int64]:
@@ -48,15 +48,6 @@ class Compared:
     def said_ids(self) -> NDArray[np.int64]:
         """The identities that were said, ascending."""
         return np.unique(self.said.ids)
-
-    @cached_property
-    def lists(self) -> tuple[list[list[int]], list[list[int]], list[list[list[float]]]]:
-        """The identities of truth and said and the overlaps, frame by frame, as plain lists."""
-        return (
-            [self.truth.ids[moment.truth].tolist() for moment in self.moments],
-            [self.said.ids[moment.said].tolist() for moment in self.moments],
-            [moment.overlap.tolist() for moment in self.moments],
-        )
 
 
 def compare(said: Rows, truth: Rows, *, masks: bool = False) -> Compared:
@@ -105,7 +96,7 @@ def compare(said: Rows, truth: Rows, *, masks: bool = False) -> Compared:
         for frame, there, here, overlap in kept
         if len(there) or len(here)
     )
-    return Compared(said.take(remaining), truth.take(scored), moments, len(said) - len(remaining))
+    return Compared(said.take(remaining), truth.take(scored), moments, len(said) - len(remaining), masks)
 
 
 def best_pairs(worth: Float) -> tuple[Index, Index]:

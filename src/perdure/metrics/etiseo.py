@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 from perdure.metrics.compared import Compared, best_pairs, reaching
 
 Float = NDArray[np.float64]
+Index = NDArray[np.intp]
 _MOST = 0.5  # of an object's life
 
 
@@ -88,32 +90,45 @@ def etiseo(compared: Compared, least_dice: float = 0.5) -> Etiseo:
     least_dice : float
         In (0, 1]. For a threshold t on intersection over union give 2 t / (1 + t).
     """
-    matched, present, said = _matches(compared, least_dice)  # (R, T), (R,), (T,)
-    ids_of_reference, references_of_id = (matched > 0).sum(axis=1), (matched > 0).sum(axis=0)
-    known = references_of_id > 0
+    met = _meetings(compared, least_dice)
+    longest = np.zeros(len(met.present), np.int64)
+    np.maximum.at(longest, met.reference, met.frames)
+    ids_of_reference = np.bincount(met.reference, minlength=len(met.present))
+    references_of_id = np.bincount(met.track, minlength=len(met.said))
+    on_somebody = np.bincount(met.track, weights=met.frames, minlength=len(met.said))
     return Etiseo(
-        time=matched.max(axis=1, initial=0) / present,
+        time=longest / met.present,
         persistence=np.where(ids_of_reference > 0, 1.0 / np.maximum(1, ids_of_reference), 0.0),
-        confusion=1.0 / references_of_id[known],
-        noisy=int((matched.sum(axis=0) <= (1.0 - _MOST) * said).sum()),
+        confusion=1.0 / references_of_id[references_of_id > 0],
+        noisy=int((on_somebody <= (1.0 - _MOST) * met.said).sum()),
     )
 
 
-def _matches(
-    compared: Compared, least_dice: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """In how many frames each reference is matched by each tracked object (R, T), and the frames of each."""
+class _Meetings(NamedTuple):
+    """Every pair of reference and tracked object that were ever matched, and for how many frames."""
+
+    reference: Index  # (P,)
+    track: Index  # (P,)
+    frames: Index  # (P,)
+    present: Index  # (R,) frames of each reference
+    said: Index  # (T,) frames of each tracked object
+
+
+def _meetings(compared: Compared, least_dice: float) -> _Meetings:
     references, tracked = compared.true_ids, compared.said_ids
     reference, track = (
         np.searchsorted(ids, side.ids) for ids, side in ((references, compared.truth), (tracked, compared.said))
     )
-    matched = np.zeros((len(references), len(tracked)), np.int64)
+    keys = [np.zeros(0, np.int64)]
     for moment in compared.moments:
         dice = 2.0 * moment.overlap / (1.0 + moment.overlap)
         rows, columns = best_pairs(reaching(dice, least_dice))
-        matched[reference[moment.truth[rows]], track[moment.said[columns]]] += 1
-    return (
-        matched,
+        keys.append(reference[moment.truth[rows]] * len(tracked) + track[moment.said[columns]])
+    pairs, frames = np.unique(np.concatenate(keys), return_counts=True)
+    return _Meetings(
+        pairs // max(1, len(tracked)),
+        pairs % max(1, len(tracked)),
+        frames,
         np.bincount(reference, minlength=len(references)),
         np.bincount(track, minlength=len(tracked)),
     )

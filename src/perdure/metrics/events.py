@@ -124,7 +124,7 @@ def score_events(
     """Score the events of a run against those of a clip.
 
     A said event is right when a true one of its kind is within 5 frames and is of the same objects; each true
-    one can be told once. An event of more than two objects may stand for several true ones, which are pairs.
+    one can be told once. Events of more than two objects, true or said, stand for all their pairs.
 
     Parameters
     ----------
@@ -161,7 +161,15 @@ def came_back(merge: Merge, others: Sequence[Merge], identities: Identities) -> 
 
     None where no object of the merge stands free both before and after: nothing can be said of it.
     """
-    verdicts = []
+    names = names_around(merge, others, identities)
+    return all(before is not None and before == after for _, before, after in names) if names else None
+
+
+def names_around(
+    merge: Merge, others: Sequence[Merge], identities: Identities
+) -> list[tuple[int, int | None, int | None]]:
+    """Return (object, said id before the merge, after it) of the objects that stand free both before and after."""
+    found = []
     for true in merge.ids:
         spans = [(one.begin, one.end) for one in others if true in one.ids]
         there, seen = identities.present.get(true, _NEVER), identities.frames
@@ -169,8 +177,8 @@ def came_back(merge: Merge, others: Sequence[Merge], identities: Identities) -> 
         if before.any() and after.any():
             first = identities.votes(true, _free(seen, spans) & (seen < merge.begin), last=True)
             then = identities.votes(true, _free(seen, spans) & (seen >= merge.end), last=False)
-            verdicts.append(first is not None and first == then)
-    return all(verdicts) if verdicts else None
+            found.append((true, first, then))
+    return found
 
 
 def score_blobs(said: Tracks, blobs: Blobs, identities: Identities) -> Tally:
@@ -191,14 +199,19 @@ def score_blobs(said: Tracks, blobs: Blobs, identities: Identities) -> Tally:
 
 
 def _tally(kind: str, said: Sequence[Event], truth: Sequence[Event], identities: Identities) -> Tally:
-    theirs = [one for one in truth if one.kind == _TRUE_KIND[kind]]
+    theirs = [
+        (event.begin, frozenset(objects))
+        for event in truth
+        if event.kind == _TRUE_KIND[kind]
+        for objects in itertools.combinations(sorted(set(event.ids)), _COMPANY[kind])
+    ]
     ours = [one for one in said if one.kind == kind]
     told = [(place, objects) for place, event in enumerate(ours) for objects in _objects(event, identities)]
     apart = np.full((len(theirs), len(told)), np.inf)
-    for row, event in enumerate(theirs):
+    for row, (begin, sought) in enumerate(theirs):
         for column, (place, objects) in enumerate(told):
-            away = abs(ours[place].begin - event.begin)
-            if away <= SLACK and objects == frozenset(event.ids):
+            away = abs(ours[place].begin - begin)
+            if away <= SLACK and objects == sought:
                 apart[row, column] = away
     pairs = assign(apart).pairs
     return Tally(len(theirs), len(ours), len(pairs), len({told[column][0] for column in pairs[:, 1]}))

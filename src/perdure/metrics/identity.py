@@ -22,12 +22,24 @@ class Hota:
     missed: Float  # FN
     wrong: Float  # FP
     association: Float  # association accuracy, summed over the found
+    association_recall: Float  # the same of association recall
+    association_precision: Float  # the same of association precision
     overlap: Float  # summed over the found
 
     @property
     def deta(self) -> Float:
         """Detection accuracy (19,)."""
         return self.found / np.maximum(1, self.found + self.missed + self.wrong)
+
+    @property
+    def detection_recall(self) -> Float:
+        """DetRe (19,)."""
+        return self.found / np.maximum(1, self.found + self.missed)
+
+    @property
+    def detection_precision(self) -> Float:
+        """DetPr (19,)."""
+        return self.found / np.maximum(1, self.found + self.wrong)
 
     @property
     def assa(self) -> Float:
@@ -83,30 +95,56 @@ class Identity:
 
 def hota(compared: Compared) -> Hota:
     """Return the HOTA counts; an empty side finds nothing."""
-    from motrics import compute_hota_from_similarity
+    from motrics import compute_hota, compute_hota_from_similarity
 
     none = np.zeros(len(ALPHAS))
     if not (len(compared.truth) and len(compared.said)):
-        return Hota(none, none + len(compared.truth), none + len(compared.said), none, none)
-    result = compute_hota_from_similarity(*compared.lists)
-    found, missed, wrong, association, overlap = (
-        np.array(values, np.float64)
-        for values in (
-            result.hota_tp_alphas,
-            result.hota_fn_alphas,
-            result.hota_fp_alphas,
-            result.assa_alphas,
-            result.loca_alphas,
-        )
+        return Hota(none, none + len(compared.truth), none + len(compared.said), none, none, none, none)
+    if compared.masks:
+        result = compute_hota_from_similarity(*_ids(compared), _overlaps(compared))
+    else:
+        result = compute_hota(*_ids_and_boxes(compared))
+    found = np.array(result.hota_tp_alphas, np.float64)
+    means = (result.assa_alphas, result.ass_re_alphas, result.ass_pr_alphas, result.loca_alphas)
+    return Hota(
+        found,
+        np.array(result.hota_fn_alphas, np.float64),
+        np.array(result.hota_fp_alphas, np.float64),
+        *(np.array(mean, np.float64) * found for mean in means),
     )
-    return Hota(found, missed, wrong, association * found, overlap * found)
 
 
 def identity(compared: Compared, least_overlap: float = 0.5) -> Identity:
     """Return the identity counts at one threshold of overlap; an empty side finds nothing."""
-    from motrics import compute_identity_from_similarity
+    from motrics import compute_identity, compute_identity_from_similarity
 
     if not (len(compared.truth) and len(compared.said)):
         return Identity(0, len(compared.truth), len(compared.said))
-    result = compute_identity_from_similarity(*compared.lists, threshold=least_overlap)
+    if compared.masks:
+        result = compute_identity_from_similarity(*_ids(compared), _overlaps(compared), threshold=least_overlap)
+    else:
+        result = compute_identity(*_ids_and_boxes(compared), iou_threshold=least_overlap)
     return Identity(result.idtp, result.idfn, result.idfp)
+
+
+def _ids(compared: Compared) -> tuple[list[list[int]], list[list[int]]]:
+    """The identities of both sides, frame by frame."""
+    return (
+        [compared.truth.ids[moment.truth].tolist() for moment in compared.moments],
+        [compared.said.ids[moment.said].tolist() for moment in compared.moments],
+    )
+
+
+def _overlaps(compared: Compared) -> list[list[list[float]]]:
+    return [moment.overlap.tolist() for moment in compared.moments]
+
+
+def _ids_and_boxes(compared: Compared) -> tuple[list[list[int]], list[Float], list[list[int]], list[Float]]:
+    """What motrics wants of boxes, whose overlaps it finds without making lists of them."""
+    truth, said = _ids(compared)
+    return (
+        truth,
+        [compared.truth.boxes[moment.truth] for moment in compared.moments],
+        said,
+        [compared.said.boxes[moment.said] for moment in compared.moments],
+    )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perdure.metrics.clear import Pairs, switches
 from perdure.metrics.compared import Compared
-from perdure.metrics.events import Identities, Merge, came_back
+from perdure.metrics.events import Identities, Merge, names_around
 from perdure.types import Rows
 
 LEAST_OVERLAP = 0.5
@@ -127,21 +127,25 @@ def _resolutions(compared: Compared, pairs: Pairs, merges: Sequence[Merge]) -> I
     """Merges of the truth after which not everybody has her id back."""
     identities = Identities(compared, pairs)
     for merge in merges:
-        if came_back(merge, merges, identities) is False:
-            rows = np.flatnonzero((compared.truth.frames >= merge.end) & np.isin(compared.truth.ids, merge.ids))
-            if len(rows):
-                names = " and ".join(str(one) for one in merge.ids)
-                spoilt = min(np.count_nonzero(compared.truth.ids[rows] == one) for one in merge.ids)
-                yield Mistake(
-                    "resolution",
-                    merge.begin,
-                    merge.end,
-                    merge.ids,
-                    (),
-                    _box(compared.truth, rows[0]),
-                    int(spoilt),
-                    f"objects {names} did not both get their ids back after their merge",
-                )
+        names = names_around(merge, merges, identities)
+        wrong = [one for one in names if one[1] is None or one[1] != one[2]]
+        rows = np.flatnonzero(
+            (compared.truth.frames >= merge.end) & np.isin(compared.truth.ids, [true for true, _, _ in wrong])
+        )
+        if wrong and len(rows):
+            told = ", ".join(
+                f"{true} was {before or 'nobody'} and is {after or 'nobody'}" for true, before, after in wrong
+            )
+            yield Mistake(
+                "resolution",
+                merge.begin,
+                merge.end,
+                merge.ids,
+                tuple(name for _, before, after in wrong for name in (before, after) if name is not None),
+                _box(compared.truth, rows[0]),
+                min(int(np.count_nonzero(compared.truth.ids[rows] == true)) for true, _, _ in wrong),
+                f"after the merge of {' and '.join(map(str, merge.ids))} up to frame {merge.end}: {told}",
+            )
 
 
 def _stretches(
