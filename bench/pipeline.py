@@ -68,7 +68,7 @@ def time_stages(video: str, limit: int) -> dict[str, float]:
     import numpy as np
 
     from perdure.detect.background import Background
-    from perdure.detect.components import clean, components
+    from perdure.detect.components import regions_of
     from perdure.draw import Trails, paint
     from perdure.files.film import Film
     from perdure.files.log import RunLog
@@ -88,8 +88,8 @@ def time_stages(video: str, limit: int) -> dict[str, float]:
         state, foreground = timer.add("background", lambda s=state, f=frame: detector.foreground(s, f))
         masks.append(foreground)
     for foreground in masks:
-        radius, least = round(detector.closing * scene.height), detector.least_area * foreground.size
-        regions.append(timer.add("components", lambda f=foreground, r=radius, m=least: components(clean(f, r), m)))
+        stage = detector.stage(scene.height, foreground.size)
+        regions.append(timer.add("components", lambda f=foreground, s=stage: regions_of(f, s)))
     tracker = Overlap()
     tracked = tracker.start(scene)
     for frame, seen in zip(frames, regions, strict=True):

@@ -56,7 +56,7 @@ import cv2
 import numpy as np
 
 from perdure.detect import DETECTORS, Background
-from perdure.detect.components import clean, components
+from perdure.detect.components import regions_of
 from perdure.errors import ParameterError, PerdureError
 from perdure.features.boxes import centres, intersections, overlaps, sizes
 from perdure.files.video import Source, open_source
@@ -288,7 +288,7 @@ class Ours:
         if hasattr(self.detector, "foreground"):
             begun = time.perf_counter()
             self.beside, foreground = self.detector.foreground(self.beside, frame)
-            foreground_time, raw = time.perf_counter() - begun, foreground > 0
+            foreground_time, raw = time.perf_counter() - begun, foreground == 255
         return Look(regions, raw, foreground_time, taken)
 
 
@@ -304,8 +304,7 @@ class Peer:
         said = self.model.apply(image)
         applied = time.perf_counter()
         foreground = cv2.threshold(said, 254, 255, cv2.THRESH_BINARY)[1]  # 127 is shadow
-        closing = round(self.stage.closing * image.shape[0])
-        regions = components(clean(foreground, closing), self.stage.least_area * foreground.size)
+        regions = regions_of(foreground, self.stage.stage(image.shape[0], foreground.size))
         return Look(regions, foreground > 0, applied - begun, time.perf_counter() - begun)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from worlds import Block, World, lone_walker, walk
 
-from perdure.detect.background import Background, exposure
+from perdure.detect.background import Background, exposure, look_over
 from perdure.errors import ParameterError
 from perdure.types import Frame, Regions, Scene
 
@@ -52,6 +52,37 @@ def test_a_change_of_exposure_is_not_a_region():
         for k, frame in enumerate(world.frames())
     ]
     assert [len(regions) for regions in regions_of(world, frames=dimmed)] == [0] * 3 + [1] * 37
+
+
+def test_a_slow_change_of_light_is_not_taken_for_noise_by_the_first_look():
+    world = lone_walker()
+    drifting = [
+        dataclasses.replace(frame, image=np.rint(frame.image * (0.6 + 0.02 * k)).astype(np.uint8))
+        for k, frame in enumerate(world.frames())
+    ]
+    detector = Background().prepare(drifting[::2])
+    assert np.sqrt(detector.first_look.variance).max() < 5
+    for k, regions in enumerate(regions_of(world, detector, drifting)):
+        assert len(regions) == len(world.truth().in_frame(k)), k
+
+
+def test_somebody_who_stays_for_nearly_half_of_the_time_is_neither_ground_nor_noise():
+    busy = np.full((25, 48, 48, 3), 90, np.uint8)
+    busy[:12, 16:32, 16:32] = 200
+    look = look_over(busy)
+    assert np.sqrt(look.variance).max() == 0
+    assert (look.mean == 90).all()
+
+
+def test_a_thing_of_the_grounds_colour_keeps_its_middle():
+    floor = np.full((60, 80, 3), 120, np.uint8)
+    there = floor.copy()
+    there[10:50, 30:50] = (200, 40, 40)
+    there[20:40, 34:46] = 102  # as dark as a shadow on this floor
+    detector = Background()
+    state, _ = detector.step(detector.start(Scene(80, 60)), Frame(0, 0.0, floor))
+    _, regions = detector.step(state, Frame(1, 0.04, there))
+    assert regions.masks[0].area > 0.95 * 20 * 40
 
 
 def test_exposure_is_one_on_a_still_scene_and_the_factor_otherwise():

@@ -2,8 +2,8 @@
 
 Wren, Azarbayejani, Darrell, Pentland, *Pfinder* (1997): each pixel keeps a mean colour and a variance;
 what lies further from the mean than some multiples of the noise is foreground. Departures:
-the model may take a first look over a whole file (`prepare`: median and median deviation, so that a clip
-that begins with people in it leaves no ghosts); each frame is first brought to the model's exposure by one
+the model may take a first look over a whole file (`prepare`: median and quiet deviation of pictures of one exposure,
+so that a clip that begins with people in it leaves no ghosts); each frame is first brought to the model's exposure by one
 factor per channel (automatic gain, lights); foreground sinks in more slowly than background adapts.
 """
 
@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.detect.components import clean, components
+from perdure.detect.components import Stage, regions_of
 from perdure.errors import ParameterError
 from perdure.params import parameter
 from perdure.types import Frame, Image, Regions, Scene
@@ -86,6 +86,13 @@ class Background:
     closing: float = parameter(
         0.005, "gaps closed within a region", unit="of the frame's height", low=0.0, high=0.1
     )
+    neck: float = parameter(
+        0.3,
+        "a region is taken apart where it is narrower than this share of both its parts; 0: never",
+        unit="of their thickness",
+        low=0.0,
+        high=1.0,
+    )
     first_look: FirstLook | None = field(default=None, repr=False, compare=False)
 
     needs_pixels = True
@@ -113,13 +120,14 @@ class Background:
             If the frame has no picture.
         """
         state, foreground = self.foreground(state, frame)
-        found = components(
-            clean(foreground, round(self.closing * state.height)), self.least_area * foreground.size, state.roi
-        )
-        return state, found
+        return state, regions_of(foreground, self.stage(state.height, foreground.size), state.roi)
+
+    def stage(self, height: int, pixels: int) -> Stage:
+        """Return how the foreground of a picture of this size becomes regions."""
+        return Stage(round(self.closing * height), self.least_area * pixels, self.neck)
 
     def foreground(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, NDArray[np.uint8]]:
-        """Return the raw foreground of one frame, (H, W) 0 or 255; the model learns from it."""
+        """Return the raw foreground of one frame, (H, W) 255, 127 for shadow, or 0; the model learns from it."""
         if frame.image is None:
             raise ParameterError("the background detector needs pictures; give --detector a file of detections")
         image = _smooth(frame.image)
@@ -156,23 +164,42 @@ class Background:
 def look_over(images: NDArray[np.uint8]) -> FirstLook:
     """Return median and noise of pictures spread over a film, (N, H, W, 3) uint8.
 
-    The noise is the median deviation from the median, scaled to a Gaussian's standard deviation.
+    All are first brought to one exposure, that of their median, so that a slow change of light is not taken for
+    noise. The noise is that of the quieter third: a low quantile of the deviations from the median, scaled to a
+    Gaussian's standard deviation; where things pass for half of the time it is still that of the background.
     """
     images = images[: len(images) - (1 - len(images) % 2)]  # an odd number: the median is one of them
-    half = len(images) // 2
+    mean, _ = _median_and_noise(images)
+    factors = [exposure(image, mean) for image in images]
+    if any((factor != 1.0).any() for factor in factors):
+        images = np.stack([_exposed(image, factor) for image, factor in zip(images, factors, strict=True)])
+    mean, variance = _median_and_noise(images)
+    return FirstLook(mean, variance)
+
+
+def _median_and_noise(images: NDArray[np.uint8]) -> tuple[Single, Single]:
+    """The median (H, W, 3) and the squared noise (H, W) of an odd number of pictures."""
+    half, low = len(images) // 2, round(_QUIET * (len(images) - 1))
     mean = np.empty(images.shape[1:], np.float32)
     variance = np.empty(images.shape[1:3], np.float32)
 
     def look(y: int) -> None:
         strip = images[:, y : y + _STRIP]  # (N, strip, W, 3)
         middle = np.partition(strip, half, axis=0)[half]
-        deviation = np.partition(np.maximum(strip, middle) - np.minimum(strip, middle), half, axis=0)[half]
+        deviation = np.partition(np.maximum(strip, middle) - np.minimum(strip, middle), low, axis=0)[low]
         mean[y : y + _STRIP] = middle
         variance[y : y + _STRIP] = np.square(deviation * _GAUSSIAN).mean(axis=2)
 
     with ThreadPoolExecutor(2) as threads:  # strips that stay in the cache; each writes its own rows
         list(threads.map(look, range(0, images.shape[1], _STRIP)))
-    return FirstLook(mean, variance)
+    return mean, variance
+
+
+def _exposed(image: Image, factor: Single) -> Image:
+    """A picture whose channels are multiplied, in whole grey levels."""
+    levels = np.arange(256, dtype=np.float32)[:, None] * factor  # (256, 3)
+    table = np.clip(np.rint(levels), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(image, table[None]), np.uint8)
 
 
 def exposure(image: Image, mean: Single) -> Single:
@@ -192,7 +219,10 @@ _HEALING = 5.0  # s over which a model that has seen nothing yet takes in what s
 _STRIP = 32  # rows
 _GRID = 32  # rows of the grid on which the exposure is measured
 _GREY = 4  # grey levels that the channels of a colourless picture may differ by
-_GAUSSIAN = 1.4826  # standard deviation of a Gaussian / its median absolute deviation
+_QUIET = (
+    0.3  # quantile of the deviations that tells the noise: traffic may hide the background for longer than half
+)
+_GAUSSIAN = 1 / 0.3853  # standard deviation of a Gaussian / that quantile of its absolute deviations
 
 
 def _has_colour(image: Image) -> bool:

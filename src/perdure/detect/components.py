@@ -1,6 +1,10 @@
-"""Foreground pixels to regions: clean, label, measure."""
+"""Foreground pixels to regions: clean, decide what is doubtful, close gaps, label, tell bodies apart."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -9,16 +13,119 @@ from numpy.typing import NDArray
 from perdure.types import Bits, Mask, Regions
 
 
-def clean(foreground: NDArray[np.uint8], closing: int) -> NDArray[np.uint8]:
-    """Keep what most of each 5x5 neighbourhood says and close gaps of up to about `closing` pixels; 0 or 255."""
-    share = cv2.blur(foreground, (5, 5))  # 13 of 25 pixels give 133, 12 give 122
-    smooth = cv2.threshold(share, 127, 255, cv2.THRESH_BINARY)[1]
-    x, y, width, height = cv2.boundingRect(smooth)
-    if closing >= 1 and width:
-        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * closing + 1, 2 * closing + 1))
-        part = smooth[y : y + height, x : x + width]  # closing never leaves the box around everything
-        part[...] = cv2.morphologyEx(part, cv2.MORPH_CLOSE, disc)
-    return np.asarray(smooth, np.uint8)
+@dataclass(frozen=True)
+class Stage:
+    """How foreground becomes regions; pixels.
+
+    Parameters
+    ----------
+    closing : int
+        Gaps of up to about this are closed.
+    least_area : float
+        Smaller components are left out.
+    neck : float
+        A region is taken apart where it is narrower than this share of both its parts; 0: never.
+    """
+
+    closing: int = 0
+    least_area: float = 1.0
+    neck: float = 0.0
+
+
+def regions_of(foreground: NDArray[np.uint8], stage: Stage, roi: Bits | None = None) -> Regions:
+    """Return the regions of a foreground: cleaned, doubtful pixels decided, gaps closed, bodies told apart.
+
+    Parameters
+    ----------
+    foreground : (H, W) uint8
+        255 moving, 127 shadow or a thing of the ground's colour, 0 background.
+    stage : Stage
+        How.
+    roi : (H, W) bool or None
+        Only pixels inside count.
+    """
+    seen = smooth(foreground)
+    if roi is not None:
+        seen = np.where(roi, seen, np.uint8(0))
+    found = components(close(seen, stage.closing), stage.least_area)
+    if not stage.neck:
+        return found
+    masks = [part for mask in found.masks for part in told_apart(mask, seen, stage)]
+    return Regions.of(np.array([mask.box for mask in masks], np.float32), masks=masks)
+
+
+def smooth(foreground: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Keep what most of each 5x5 neighbourhood says, 0 or 255; shadow only where moving pixels enclose it."""
+    seen = np.zeros_like(foreground)
+    x, y, width, height = cv2.boundingRect(foreground)
+    if not width:
+        return seen
+    rim = (
+        slice(max(0, y - 2), y + height + 2),
+        slice(max(0, x - 2), x + width + 2),
+    )  # outside of it nothing is seen
+    part = foreground[rim]
+    sure = _majority(cv2.threshold(part, 254, 255, cv2.THRESH_BINARY)[1])
+    if (part == 127).any():
+        from perdure.maths.kernels.enclosed import enclosed
+
+        some = _majority(cv2.threshold(part, 0, 255, cv2.THRESH_BINARY)[1])
+        doubtful = np.maximum(sure, some & 127)  # 0, 127, 255
+        enclosed(doubtful, np.empty_like(doubtful))
+        sure = cv2.threshold(doubtful, 254, 255, cv2.THRESH_BINARY)[1]
+    seen[rim] = sure
+    return seen
+
+
+def close(seen: NDArray[np.uint8], closing: int) -> NDArray[np.uint8]:
+    """Close gaps of up to about `closing` pixels; 0 or 255."""
+    x, y, width, height = cv2.boundingRect(seen)
+    if closing < 1 or not width:
+        return seen
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * closing + 1, 2 * closing + 1))
+    closed = np.zeros_like(seen)  # closing never leaves the box around everything
+    cv2.morphologyEx(
+        seen[y : y + height, x : x + width], cv2.MORPH_CLOSE, disc, closed[y : y + height, x : x + width]
+    )
+    return closed
+
+
+def told_apart(mask: Mask, seen: NDArray[np.uint8], stage: Stage) -> list[Mask]:
+    """Return the bodies of a region that hang together by a neck only, or by a gap that was closed; else the region.
+
+    Bodies are of like thickness and area: legs, heads and wings are none.
+    """
+    x1, y1, x2, y2 = mask.box
+    step = max(1, math.isqrt(mask.bits.size // _DETAIL))  # a large region is looked at more coarsely
+    bits = np.pad(mask.bits[::step, ::step], 1)
+    firm = bits & np.pad(seen[y1:y2:step, x1:x2:step] > 0, 1)
+    distance = cv2.distanceTransform(firm.view(np.uint8), cv2.DIST_L2, 3)
+    relief = np.minimum(4.0 * distance, 65535.0).astype(np.uint16)
+    relief[bits & (relief == 0)] = 1  # what was closed joins, but at the lowest
+    if relief.max() < 4.0 * _LEAST_THICKNESS:
+        return [mask]
+    from perdure.maths.kernels.basins import basins
+
+    order = np.argsort(relief, axis=None, kind="stable")[::-1][: np.count_nonzero(relief)]
+    least = 2.0 * stage.least_area / step**2
+    labels = basins(relief, order, stage.neck, _LIKE_THICKNESS, _LIKE_AREA, least)[1:-1, 1:-1]
+    names = np.unique(labels[labels > 0])
+    if len(names) < 2:
+        return [mask]
+    height, width = mask.bits.shape
+    whole = np.repeat(np.repeat(labels, step, axis=0), step, axis=1)[:height, :width]
+    return [part for name in names if (part := Mask.of_image(mask.bits & (whole == name), mask.y, mask.x)).area]
+
+
+_DETAIL = 8192  # pixels of a crop beyond which every second, third, … is enough
+_LEAST_THICKNESS = 2.0  # pixels from the middle to the border, below which nothing is a body
+_LIKE_THICKNESS = 0.6  # of the thicker body
+_LIKE_AREA = 0.5  # of the larger body
+
+
+def _majority(marks: NDArray[Any]) -> NDArray[np.uint8]:
+    share = cv2.blur(marks, (5, 5))  # 13 of 25 pixels give 133, 12 give 122
+    return np.asarray(cv2.threshold(share, 127, 255, cv2.THRESH_BINARY)[1], np.uint8)
 
 
 def components(foreground: NDArray[np.uint8], least_area: float, roi: Bits | None = None) -> Regions:

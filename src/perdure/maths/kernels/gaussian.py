@@ -23,7 +23,7 @@ def compare_and_learn(
     rate: np.float32,
     foreground_rate: np.float32,
 ) -> None:
-    """Mark the pixels far from their mean in `foreground` (255 or 0) and let the model learn in place.
+    """Mark the pixels far from their mean in `foreground` (255; 127 for shadow; or 0) and let the model learn in place.
 
     Parameters
     ----------
@@ -41,7 +41,8 @@ def compare_and_learn(
         Foreground where the mean squared difference > squared_threshold * max(variance, least_variance).
     darkest_shadow : float32
         In [0, 1]: a pixel as bright as this share of its mean or brighter, but no brighter than it, and
-        of its colour within the same threshold, is shadow: background (Horprasert et al. 1999). 1: no shadows.
+        of its colour within the same threshold, is shadow: it learns like background (Horprasert et al. 1999).
+        1: no shadows.
     rate, foreground_rate : float32
         In [0, 1]: how far background and foreground pixels move towards what they see.
     """
@@ -63,8 +64,9 @@ def compare_and_learn(
         )
         beside = squared - along * along / max(length, np.float32(1.0)) * third
         shadow = (along <= 0) & (along >= (darkest_shadow - np.float32(1.0)) * length) & (beside <= limit)
-        moving = (squared > limit) & ~shadow
-        marks[i] = 255 if moving else 0
+        far = squared > limit
+        moving = far & ~shadow
+        marks[i] = 255 if moving else (127 if far else 0)
         step = foreground_rate if moving else rate
         variances[i] = known + (np.float32(0.0) if moving else rate * (squared - known))
         means[3 * i] += step * red
@@ -95,7 +97,8 @@ def compare_and_learn_twin(
     length = mean[..., 0] * mean[..., 0] + mean[..., 1] * mean[..., 1] + mean[..., 2] * mean[..., 2]
     beside = squared - along * along / np.maximum(length, np.float32(1.0)) * third
     shadow = (along <= 0) & (along >= (darkest_shadow - np.float32(1.0)) * length) & (beside <= limit)
-    moving = (squared > limit) & ~shadow
-    foreground[...] = np.where(moving, 255, 0)
+    far = squared > limit
+    moving = far & ~shadow
+    foreground[...] = np.where(moving, 255, np.where(far, 127, 0))
     variance += np.where(moving, np.float32(0.0), rate * (squared - variance))
     mean += np.where(moving, foreground_rate, rate)[..., None] * difference
