@@ -38,11 +38,24 @@ def test_a_clip_that_begins_with_somebody_in_it_leaves_no_ghost_after_a_first_lo
         assert len(regions) == len(world.truth().in_frame(k))
 
 
-def test_live_a_ghost_heals_after_a_while():
-    world = World((Block(walk((5, 30), (2, 0))),), count=400)
-    found = regions_of(world, Background(absorb=10.0))
-    assert len(found[20]) == 2, "the ghost and the walker"
-    assert len(found[-1]) == 0
+def test_live_a_ghost_is_gone_within_a_second_or_two():
+    world = World((Block(walk((5, 30), (2, 0))),), count=60)
+    counts = [len(regions) for regions in regions_of(world)]
+    assert counts[8] == 2, "the ghost and the walker"
+    assert counts[25:50] == [1] * 25
+
+
+def test_what_is_taken_away_heals_and_what_is_left_behind_stays():
+    left = Block(lambda k: (20, 30) if k >= 5 else None)
+    taken = Block(lambda k: (80, 30) if k < 5 else None)
+    found = regions_of(World((left, taken), count=60))
+    assert [len(regions) for regions in found[30:]] == [1] * 30
+    assert found[-1].boxes[0][0] < 40
+
+
+def test_live_somebody_who_comes_and_stands_for_a_minute_is_still_seen():
+    world = World((Block(lambda k: None if k < 3 else (min(5 + 2 * k, 50), 30)),), count=600)
+    assert all(len(regions) == 1 for regions in regions_of(world)[4:])
 
 
 def test_a_change_of_exposure_is_not_a_region():

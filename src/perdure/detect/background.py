@@ -4,7 +4,8 @@ Wren, Azarbayejani, Darrell, Pentland, *Pfinder* (1997): each pixel keeps a mean
 what lies further from the mean than some multiples of the noise is foreground. Departures:
 the model may take a first look over a whole file (`prepare`: median and quiet deviation of pictures of one exposure,
 so that a clip that begins with people in it leaves no ghosts); each frame is first brought to the model's exposure by one
-factor per channel (automatic gain, lights); foreground sinks in more slowly than background adapts.
+factor per channel (automatic gain, lights); foreground sinks in more slowly than background adapts; where a thing
+of the model is gone, which its edges tell, the model takes that in at once.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.detect.components import Stage, regions_of
+from perdure.detect.ghosts import ghosts
 from perdure.errors import ParameterError
 from perdure.params import parameter
 from perdure.types import Frame, Image, Regions, Scene
@@ -119,8 +122,10 @@ class Background:
         ParameterError
             If the frame has no picture.
         """
-        state, foreground = self.foreground(state, frame)
-        return state, regions_of(foreground, self.stage(state.height, foreground.size), state.roi)
+        state, seen = self._see(state, frame)
+        found = regions_of(seen.foreground, self.stage(state.height, seen.foreground.size), state.roi)
+        self._heal(state, found, seen)
+        return state, found
 
     def stage(self, height: int, pixels: int) -> Stage:
         """Return how the foreground of a picture of this size becomes regions."""
@@ -128,6 +133,10 @@ class Background:
 
     def foreground(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, NDArray[np.uint8]]:
         """Return the raw foreground of one frame, (H, W) 255, 127 for shadow, or 0; the model learns from it."""
+        state, seen = self._see(state, frame)
+        return state, seen.foreground
+
+    def _see(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, _Seen]:
         if frame.image is None:
             raise ParameterError("the background detector needs pictures; give --detector a file of detections")
         image = _smooth(frame.image)
@@ -135,30 +144,49 @@ class Background:
             first = np.full(image.shape[:2], self.least_noise**2, np.float32)
             state = dataclasses.replace(state, mean=image.astype(np.float32), variance=first)
         elapsed = max(frame.time - state.time, 0.1 / state.fps)
-        foreground = self._compare_and_learn(state, image, elapsed)
-        return dataclasses.replace(state, age=state.age + elapsed, time=frame.time), foreground
+        seen = _Seen(image, exposure(image, state.mean), np.empty(image.shape[:2], np.uint8), elapsed)
+        self._compare_and_learn(state, seen)
+        return dataclasses.replace(state, age=state.age + elapsed, time=frame.time), seen
 
-    def _compare_and_learn(self, state: BackgroundState, image: Image, elapsed: float) -> NDArray[np.uint8]:
+    def _compare_and_learn(self, state: BackgroundState, seen: _Seen) -> None:
         from perdure.maths.kernels.gaussian import compare_and_learn
 
-        young = elapsed / (state.age + elapsed)  # a plain mean as long as little is known
-        rate = max(1.0 - math.exp(-elapsed / self.memory), young)
-        absorb = min(self.absorb, max(state.age, _HEALING))  # a young model heals its ghosts sooner
-        foreground_rate = 1.0 - math.exp(-elapsed / absorb)
-        foreground = np.empty(image.shape[:2], np.uint8)
+        young = seen.elapsed / (state.age + seen.elapsed)  # a plain mean as long as little is known
         compare_and_learn(
-            image,
-            exposure(image, state.mean),
+            seen.image,
+            seen.factor,
             state.mean,
             state.variance,
-            foreground,
+            seen.foreground,
             np.float32(self.threshold**2),
             np.float32(self.least_noise**2),
-            np.float32(self.darkest_shadow if _has_colour(image) else 1.0),
-            np.float32(rate),
-            np.float32(foreground_rate),
+            np.float32(self.darkest_shadow if _has_colour(seen.image) else 1.0),
+            np.float32(max(_share(seen.elapsed, self.memory), young)),
+            np.float32(_share(seen.elapsed, self.absorb)),
         )
-        return foreground
+
+    def _heal(self, state: BackgroundState, found: Regions, seen: _Seen) -> None:
+        """Let the model take in, within a second, the places of things that are gone."""
+        share = np.float32(_share(seen.elapsed, _HEALED))
+        for number in np.flatnonzero(ghosts(found, seen.image, state.mean)):
+            mask = found.masks[number]
+            x1, y1, x2, y2 = mask.box
+            known = state.mean[y1:y2, x1:x2]
+            known[mask.bits] += share * (seen.image[y1:y2, x1:x2][mask.bits] * seen.factor - known[mask.bits])
+
+
+class _Seen(NamedTuple):
+    """A frame beside the model."""
+
+    image: Image  # (H, W, 3), a little smoothed
+    factor: Single  # (3,) what brings it to the model's exposure
+    foreground: NDArray[np.uint8]  # (H, W)
+    elapsed: float  # seconds since the frame before
+
+
+def _share(elapsed: float, time: float) -> float:
+    """How far a mean over so much time moves towards what it sees."""
+    return 1.0 - math.exp(-elapsed / time)
 
 
 def look_over(images: NDArray[np.uint8]) -> FirstLook:
@@ -215,7 +243,7 @@ def exposure(image: Image, mean: Single) -> Single:
 
 
 _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
-_HEALING = 5.0  # s over which a model that has seen nothing yet takes in what stands still
+_HEALED = 0.4  # s over which a ghost is taken in
 _STRIP = 32  # rows
 _GRID = 32  # rows of the grid on which the exposure is measured
 _GREY = 4  # grey levels that the channels of a colourless picture may differ by
