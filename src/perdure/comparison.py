@@ -58,8 +58,6 @@ class Comparison:
         Of a run: from which confidence hidden targets counted.
     beyond : int
         Rows of the result in frames of which the truth has no row.
-    has_groups : bool
-        The result tells of events and groups, as a run does and text does not.
     group : str
         The argument that the result came from, where several hold the same sequences.
     notes : tuple of str
@@ -78,7 +76,6 @@ class Comparison:
     mistakes: tuple[Mistake, ...]
     report_confidence: float | None
     beyond: int
-    has_groups: bool
     group: str
     notes: tuple[str, ...]
 
@@ -142,7 +139,6 @@ def compare_files(match: Match, wanted: Wanted) -> Comparison:
         mistakes=tuple(mistakes(main, pairs, merges_of(events or ()))) if wanted.mistakes else (),
         report_confidence=said.report_confidence,
         beyond=_beyond(main, true),
-        has_groups=said.tracks is not None,
         group=match.group,
         notes=(*said.notes, *_notes(main, true)),
     )

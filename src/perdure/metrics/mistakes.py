@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from perdure.metrics.clear import Pairs, switches
 from perdure.metrics.compared import Compared
 from perdure.metrics.events import Identities, Merge, names_around
+from perdure.metrics.scoring import LEAST_OVERLAP
 from perdure.types import Rows
 
-LEAST_OVERLAP = 0.5
 TOGETHER = 25  # frames within which two switches make one exchange
 Index = NDArray[np.intp]
 
