@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from perdure.detect.components import Stage, regions_of
 from perdure.detect.ghosts import ghosts
+from perdure.detect.marks import Ground, take_off_halo, take_out_shadows
 from perdure.errors import ParameterError
 from perdure.params import parameter
 from perdure.types import Frame, Image, Regions, Scene
@@ -69,8 +70,8 @@ class Background:
         5.0, "noise assumed where less is measured", unit="grey levels", low=0.5, high=100.0
     )
     darkest_shadow: float = parameter(
-        0.8,
-        "what is darker than the background, but of its colour and no darker than this share, is shadow; 1: none",
+        0.4,
+        "what is evenly darker than the background and of its colour, but no darker than this share, is shadow; 1: none",
         unit="of its brightness",
         low=0.0,
         high=1.0,
@@ -102,7 +103,7 @@ class Background:
 
     def prepare(self, frames: Sequence[Frame]) -> Background:
         """Return this detector with a first look over a file, from frames spread over all of it."""
-        images = [_smooth(frame.image) for frame in frames if frame.image is not None]
+        images = [frame.image for frame in frames if frame.image is not None]
         if len(images) < _LEAST_LOOKS:
             return self
         return dataclasses.replace(self, first_look=look_over(np.stack(images)))
@@ -123,34 +124,40 @@ class Background:
             If the frame has no picture.
         """
         state, seen = self._see(state, frame)
-        found = regions_of(seen.foreground, self.stage(state.height, seen.foreground.size), state.roi)
+        stage = self.stage(state.height, seen.foreground.size)
+        found = regions_of(seen.foreground, stage, state.roi, state.mean)
         self._heal(state, found, seen)
         return state, found
 
     def stage(self, height: int, pixels: int) -> Stage:
         """Return how the foreground of a picture of this size becomes regions."""
-        return Stage(round(self.closing * height), self.least_area * pixels, self.neck)
+        return Stage(round(self.closing * height), self.least_area * pixels, self.neck, _HOLE)
 
     def foreground(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, NDArray[np.uint8]]:
-        """Return the raw foreground of one frame, (H, W) 255, 127 for shadow, or 0; the model learns from it."""
+        """Return the raw foreground of one frame, (H, W): 255 moving, 0 not, else doubtful; the model learns."""
         state, seen = self._see(state, frame)
         return state, seen.foreground
 
     def _see(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, _Seen]:
         if frame.image is None:
             raise ParameterError("the background detector needs pictures; give --detector a file of detections")
-        image = _smooth(frame.image)
+        image = np.ascontiguousarray(frame.image)
         if not state.mean.size:
             first = np.full(image.shape[:2], self.least_noise**2, np.float32)
             state = dataclasses.replace(state, mean=image.astype(np.float32), variance=first)
         elapsed = max(frame.time - state.time, 0.1 / state.fps)
         seen = _Seen(image, exposure(image, state.mean), np.empty(image.shape[:2], np.uint8), elapsed)
-        self._compare_and_learn(state, seen)
+        contrast = np.empty_like(seen.foreground)
+        self._compare_and_learn(state, seen, contrast)
+        ground = Ground(state.mean, state.variance, self.least_noise)
+        take_out_shadows(seen.foreground, image, seen.factor, ground)
+        take_off_halo(seen.foreground, contrast)
         return dataclasses.replace(state, age=state.age + elapsed, time=frame.time), seen
 
-    def _compare_and_learn(self, state: BackgroundState, seen: _Seen) -> None:
+    def _compare_and_learn(self, state: BackgroundState, seen: _Seen, contrast: NDArray[np.uint8]) -> None:
         from perdure.maths.kernels.gaussian import compare_and_learn
 
+        darkest = self.darkest_shadow if _has_colour(seen.image) else 1.0
         young = seen.elapsed / (state.age + seen.elapsed)  # a plain mean as long as little is known
         compare_and_learn(
             seen.image,
@@ -158,9 +165,11 @@ class Background:
             state.mean,
             state.variance,
             seen.foreground,
+            contrast,
             np.float32(self.threshold**2),
             np.float32(self.least_noise**2),
-            np.float32(self.darkest_shadow if _has_colour(seen.image) else 1.0),
+            np.float32(max(darkest, _FAINT)),
+            np.float32(darkest),
             np.float32(max(_share(seen.elapsed, self.memory), young)),
             np.float32(_share(seen.elapsed, self.absorb)),
         )
@@ -178,7 +187,7 @@ class Background:
 class _Seen(NamedTuple):
     """A frame beside the model."""
 
-    image: Image  # (H, W, 3), a little smoothed
+    image: Image  # (H, W, 3)
     factor: Single  # (3,) what brings it to the model's exposure
     foreground: NDArray[np.uint8]  # (H, W)
     elapsed: float  # seconds since the frame before
@@ -243,6 +252,8 @@ def exposure(image: Image, mean: Single) -> Single:
 
 
 _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
+_FAINT = 0.8  # of the ground's brightness: so faint a shadow need not be even
+_HOLE = 0.05  # of a region's area: smaller holes in it are filled
 _HEALED = 0.4  # s over which a ghost is taken in
 _STRIP = 32  # rows
 _GRID = 32  # rows of the grid on which the exposure is measured
@@ -258,7 +269,3 @@ def _has_colour(image: Image) -> bool:
     step = max(1, min(image.shape[:2]) // _GRID)
     seen = image[::step, ::step].astype(np.int16)
     return bool((np.ptp(seen, axis=2) > _GREY).any())
-
-
-def _smooth(image: Image) -> Image:
-    return np.asarray(cv2.GaussianBlur(image, (3, 3), 0), np.uint8)

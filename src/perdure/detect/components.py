@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from perdure.detect.joining import joined
 from perdure.types import Bits, Mask, Regions
 
 
@@ -25,55 +26,68 @@ class Stage:
         Smaller components are left out.
     neck : float
         A region is taken apart where it is narrower than this share of both its parts; 0: never.
+    hole : float
+        Holes of at most this share of a region's area are filled.
     """
 
     closing: int = 0
     least_area: float = 1.0
     neck: float = 0.0
+    hole: float = 0.0
 
 
-def regions_of(foreground: NDArray[np.uint8], stage: Stage, roi: Bits | None = None) -> Regions:
-    """Return the regions of a foreground: cleaned, doubtful pixels decided, gaps closed, bodies told apart.
+def regions_of(
+    foreground: NDArray[np.uint8], stage: Stage, roi: Bits | None = None, mean: NDArray[np.float32] | None = None
+) -> Regions:
+    """Return the regions of a foreground: cleaned, doubt decided, gaps closed, bodies told apart, pieces joined.
 
     Parameters
     ----------
     foreground : (H, W) uint8
-        255 moving, 127 shadow or a thing of the ground's colour, 0 background.
+        255 moving, 0 background; what lies between is doubtful: shadow, or a thing that hardly differs from the ground.
     stage : Stage
         How.
     roi : (H, W) bool or None
         Only pixels inside count.
+    mean : (H, W, 3) float32 or None
+        The model's mean picture, which tells what may stand in front; None: not known.
     """
     seen = smooth(foreground)
     if roi is not None:
         seen = np.where(roi, seen, np.uint8(0))
-    found = components(close(seen, stage.closing), stage.least_area)
-    if not stage.neck:
-        return found
-    masks = [part for mask in found.masks for part in told_apart(mask, seen, stage)]
+    found = components(close(seen, stage.closing), _PIECE * stage.least_area, hole=stage.hole)
+    bodies = [
+        part
+        for mask in found.masks
+        for part in (told_apart(mask, seen, stage) if stage.neck and mask.area >= stage.least_area else [mask])
+    ]
+    masks = [
+        mask
+        for mask in joined(bodies, mean, stage.closing + _MAJORITY // 2)
+        if mask.area >= max(stage.least_area, 1.0)
+    ]
     return Regions.of(np.array([mask.box for mask in masks], np.float32), masks=masks)
 
 
 def smooth(foreground: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Keep what most of each 5x5 neighbourhood says, 0 or 255; shadow only where moving pixels enclose it."""
+    """Keep what most of each 5x5 neighbourhood says, 0 or 255; what is doubtful only where moving pixels enclose it."""
+    from perdure.maths.kernels.enclosed import enclosed
+
     seen = np.zeros_like(foreground)
-    x, y, width, height = cv2.boundingRect(foreground)
+    moving = cv2.threshold(foreground, 254, 255, cv2.THRESH_BINARY)[1]
+    x, y, width, height = cv2.boundingRect(moving)
     if not width:
         return seen
-    rim = (
-        slice(max(0, y - 2), y + height + 2),
-        slice(max(0, x - 2), x + width + 2),
-    )  # outside of it nothing is seen
-    part = foreground[rim]
-    sure = _majority(cv2.threshold(part, 254, 255, cv2.THRESH_BINARY)[1])
-    if (part == 127).any():
-        from perdure.maths.kernels.enclosed import enclosed
-
-        some = _majority(cv2.threshold(part, 0, 255, cv2.THRESH_BINARY)[1])
-        doubtful = np.maximum(sure, some & 127)  # 0, 127, 255
-        enclosed(doubtful, np.empty_like(doubtful))
-        sure = cv2.threshold(doubtful, 254, 255, cv2.THRESH_BINARY)[1]
-    seen[rim] = sure
+    reach = _MAJORITY // 2
+    rim = (  # outside of it nothing is seen
+        slice(max(0, y - reach), y + height + reach),
+        slice(max(0, x - reach), x + width + reach),
+    )
+    sure = _majority(moving[rim])
+    some = _majority(cv2.threshold(foreground[rim], 0, 255, cv2.THRESH_BINARY)[1])
+    doubtful = np.maximum(sure, some & 127)  # 0, 127, 255
+    enclosed(doubtful, np.empty_like(doubtful))
+    seen[rim] = cv2.threshold(doubtful, 254, 255, cv2.THRESH_BINARY)[1]
     return seen
 
 
@@ -117,6 +131,8 @@ def told_apart(mask: Mask, seen: NDArray[np.uint8], stage: Stage) -> list[Mask]:
     return [part for name in names if (part := Mask.of_image(mask.bits & (whole == name), mask.y, mask.x)).area]
 
 
+_MAJORITY = 5  # pixels, the side of the neighbourhood that votes
+_PIECE = 0.5  # of the smallest region: what may be a piece of one
 _DETAIL = 8192  # pixels of a crop beyond which every second, third, … is enough
 _LEAST_THICKNESS = 2.0  # pixels from the middle to the border, below which nothing is a body
 _LIKE_THICKNESS = 0.6  # of the thicker body
@@ -124,11 +140,13 @@ _LIKE_AREA = 0.5  # of the larger body
 
 
 def _majority(marks: NDArray[Any]) -> NDArray[np.uint8]:
-    share = cv2.blur(marks, (5, 5))  # 13 of 25 pixels give 133, 12 give 122
+    share = cv2.blur(marks, (_MAJORITY, _MAJORITY))  # 13 of 25 pixels give 133, 12 give 122
     return np.asarray(cv2.threshold(share, 127, 255, cv2.THRESH_BINARY)[1], np.uint8)
 
 
-def components(foreground: NDArray[np.uint8], least_area: float, roi: Bits | None = None) -> Regions:
+def components(
+    foreground: NDArray[np.uint8], least_area: float, roi: Bits | None = None, hole: float = 0.0
+) -> Regions:
     """Return the 8-connected components of at least `least_area` pixels, inside the roi, with their masks.
 
     Components are found by their borders (Suzuki & Abe 1985) and filled one by one, from top to bottom:
@@ -142,6 +160,8 @@ def components(foreground: NDArray[np.uint8], least_area: float, roi: Bits | Non
         Pixels.
     roi : (H, W) bool or None
         Only pixels inside count.
+    hole : float
+        Holes of at most this share of a component's area are filled.
     """
     if roi is not None:
         foreground = np.where(roi, foreground, np.uint8(0))
@@ -153,10 +173,15 @@ def components(foreground: NDArray[np.uint8], least_area: float, roi: Bits | Non
             if width * height >= least_area:
                 crop = np.zeros((height, width), np.uint8)
                 cv2.drawContours(crop, borders, number, 1, cv2.FILLED, 8, tree, 1, (-x, -y))
+                inside, largest = tree[0, number, _CHILD], hole * cv2.contourArea(borders[number])
+                while inside >= 0:
+                    if cv2.contourArea(borders[inside]) < largest:
+                        cv2.drawContours(crop, borders, inside, 1, cv2.FILLED, 8, None, 1, (-x, -y))
+                    inside = tree[0, inside, _NEXT]
                 if np.count_nonzero(crop) >= max(least_area, 1.0):
                     masks.append(Mask(y, x, crop.view(np.bool_)))
     boxes = np.array([mask.box for mask in masks], np.float32)
     return Regions.of(boxes, masks=masks)
 
 
-_PARENT = 3  # column of cv2's contour tree
+_NEXT, _CHILD, _PARENT = 0, 2, 3  # columns of cv2's contour tree

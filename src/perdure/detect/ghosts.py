@@ -51,7 +51,8 @@ def _slope(picture: NDArray[Any]) -> Single:
     """Grey levels a pixel, (H, W): of the channel that changes most."""
     levels = np.ascontiguousarray(picture, np.float32)
     across, down = (cv2.Sobel(levels, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1)))
-    return np.asarray(cv2.magnitude(across, down).max(axis=2), np.float32)
+    steep = cv2.magnitude(across, down)
+    return np.maximum(np.maximum(steep[..., 0], steep[..., 1]), steep[..., 2])  # quicker than a reduction
 
 
 _MARGIN = 3  # pixels around a region

@@ -9,6 +9,10 @@ from perdure.maths.kernels.compile import kernel
 
 Single = NDArray[np.float32]
 
+MOVING, DARKENED, SHADOW, WEAK = 255, 191, 127, 63  # marks of pixels; 0 is background
+SHADOW_COLOUR = 0.25  # of the squared threshold: a shadow keeps the ground's colour better than its brightness
+WEAK_SHARE = 0.25  # of the squared threshold: half as far from the mean as what is foreground
+
 
 @kernel
 def compare_and_learn(
@@ -17,13 +21,18 @@ def compare_and_learn(
     mean: Single,
     variance: Single,
     foreground: NDArray[np.uint8],
+    contrast: NDArray[np.uint8],
     squared_threshold: np.float32,
     least_variance: np.float32,
+    faintest_shadow: np.float32,
     darkest_shadow: np.float32,
     rate: np.float32,
     foreground_rate: np.float32,
 ) -> None:
-    """Mark the pixels far from their mean in `foreground` (255; 127 for shadow; or 0) and let the model learn in place.
+    """Mark each pixel in `foreground`, and let the model learn in place.
+
+    MOVING: far from the mean. SHADOW: as far, but a little darker than the ground and of its colour. DARKENED: the
+    same, but much darker, so that only its neighbourhood can tell (`evenly_darker`). WEAK: half as far. 0: background.
 
     Parameters
     ----------
@@ -37,19 +46,21 @@ def compare_and_learn(
         Mean over the channels, in squared grey levels.
     foreground : (H, W) uint8, changed
         Every element is written.
+    contrast : (H, W) uint8, changed
+        Every element is written: how far from the mean, root mean square over the channels, in whole grey levels.
     squared_threshold, least_variance : float32
         Foreground where the mean squared difference > squared_threshold * max(variance, least_variance).
-    darkest_shadow : float32
-        In [0, 1]: a pixel as bright as this share of its mean or brighter, but no brighter than it, and
-        of its colour within the same threshold, is shadow: it learns like background (Horprasert et al. 1999).
-        1: no shadows.
+    faintest_shadow, darkest_shadow : float32
+        In [0, 1]: a pixel of its mean's colour (within SHADOW_COLOUR of the threshold) and no brighter than it is
+        SHADOW if it is as bright as the first share of its mean or brighter, and learns like background
+        (Horprasert et al. 1999); DARKENED if at least as bright as the second. 1: none.
     rate, foreground_rate : float32
         In [0, 1]: how far background and foreground pixels move towards what they see.
     """
     third = np.float32(1.0) / np.float32(3.0)
     first, second, last = exposure[0], exposure[1], exposure[2]
     colours, means = image.reshape(-1), mean.reshape(-1)  # (3 H W,), views: one flat loop becomes vector code
-    variances, marks = variance.reshape(-1), foreground.reshape(-1)  # (H W,)
+    variances, marks, contrasts = variance.reshape(-1), foreground.reshape(-1), contrast.reshape(-1)  # (H W,)
     for i in range(variances.shape[0]):
         red = np.float32(colours[3 * i]) * first - means[3 * i]
         green = np.float32(colours[3 * i + 1]) * second - means[3 * i + 1]
@@ -63,10 +74,13 @@ def compare_and_learn(
             means[3 * i] * means[3 * i] + means[3 * i + 1] * means[3 * i + 1] + means[3 * i + 2] * means[3 * i + 2]
         )
         beside = squared - along * along / max(length, np.float32(1.0)) * third
-        shadow = (along <= 0) & (along >= (darkest_shadow - np.float32(1.0)) * length) & (beside <= limit)
-        far = squared > limit
+        coloured = (along <= 0) & (beside <= np.float32(SHADOW_COLOUR) * limit)
+        shadow = coloured & (along >= (faintest_shadow - np.float32(1.0)) * length)
+        darkened = coloured & (along >= (darkest_shadow - np.float32(1.0)) * length)
+        far, weak = squared > limit, squared > np.float32(WEAK_SHARE) * limit
         moving = far & ~shadow
-        marks[i] = 255 if moving else (127 if far else 0)
+        marks[i] = (DARKENED if darkened else MOVING) if moving else (SHADOW if far else (WEAK if weak else 0))
+        contrasts[i] = np.uint8(min(np.sqrt(squared), np.float32(255.0)))
         step = foreground_rate if moving else rate
         variances[i] = known + (np.float32(0.0) if moving else rate * (squared - known))
         means[3 * i] += step * red
@@ -80,8 +94,10 @@ def compare_and_learn_twin(
     mean: Single,
     variance: Single,
     foreground: NDArray[np.uint8],
+    contrast: NDArray[np.uint8],
     squared_threshold: np.float32,
     least_variance: np.float32,
+    faintest_shadow: np.float32,
     darkest_shadow: np.float32,
     rate: np.float32,
     foreground_rate: np.float32,
@@ -96,9 +112,12 @@ def compare_and_learn_twin(
     along = along[..., 0] + along[..., 1] + along[..., 2]  # (H, W)
     length = mean[..., 0] * mean[..., 0] + mean[..., 1] * mean[..., 1] + mean[..., 2] * mean[..., 2]
     beside = squared - along * along / np.maximum(length, np.float32(1.0)) * third
-    shadow = (along <= 0) & (along >= (darkest_shadow - np.float32(1.0)) * length) & (beside <= limit)
-    far = squared > limit
+    coloured = (along <= 0) & (beside <= np.float32(SHADOW_COLOUR) * limit)
+    shadow = coloured & (along >= (faintest_shadow - np.float32(1.0)) * length)
+    darkened = coloured & (along >= (darkest_shadow - np.float32(1.0)) * length)
+    far, weak = squared > limit, squared > np.float32(WEAK_SHARE) * limit
     moving = far & ~shadow
-    foreground[...] = np.where(moving, 255, np.where(far, 127, 0))
+    foreground[...] = np.select([moving & darkened, moving, far, weak], [DARKENED, MOVING, SHADOW, WEAK])
+    contrast[...] = np.minimum(np.sqrt(squared), np.float32(255.0)).astype(np.uint8)
     variance += np.where(moving, np.float32(0.0), rate * (squared - variance))
     mean += np.where(moving, foreground_rate, rate)[..., None] * difference
