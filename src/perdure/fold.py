@@ -1,6 +1,7 @@
 """The fold: a state, a frame, its regions, a report; and `settle`, which applies late corrections.
 
-`Tracker` and `Detector` are the only contract. `detect` and `track` run one over a film; `settle` turns
+`Tracker` and `Detector` are the only contract. `detect` and `track` run one over a film, `run` both, so that the
+detector may heed what the tracker believes; `settle` turns
 the reports, whose identities may have been decided late, into one row per (frame, id).
 """
 
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -21,7 +22,9 @@ S = TypeVar("S")
 class Detector(Protocol[S]):
     """Pixels to regions: a frozen dataclass of parameters with a state of its own.
 
-    A detector may also have `prepare(frames) -> Detector`, a first look over frames spread over a file.
+    A detector may also have `prepare(frames) -> Detector`, a first look over frames spread over a file, and
+    `heed(state, report) -> state`: it is told, between two steps, what the tracker said of the last frame (a background
+    model, for one, does not learn where a target is believed).
     `needs_pixels` says whether it can work on frames without a picture.
     """
 
@@ -79,8 +82,37 @@ def track(seen: Iterable[tuple[Frame, Regions]], tracker: Tracker[Any], scene: S
     state = tracker.start(scene)
     for frame, regions in seen:
         state, report = tracker.step(state, frame, regions)
-        yield Step(frame, regions, report)
+        yield Step(frame, regions, _with_events(regions, report))
     yield Step(None, Regions.empty(), tracker.finish(state))
+
+
+def run(
+    frames: Iterable[Frame],
+    detector: Detector[Any],
+    tracker: Tracker[Any],
+    scene: Scene,
+    wanted: Callable[[Regions], Regions] | None = None,
+) -> Iterator[Step]:
+    """Yield a step for every frame, and one more in which the tracker finishes; the detector heeds the tracker.
+
+    `wanted` leaves the regions that the tracker shall see.
+    """
+    state, beliefs = detector.start(scene), tracker.start(scene)
+    heed = getattr(detector, "heed", None)
+    for frame in frames:
+        state, regions = detector.step(state, frame)
+        if wanted is not None:
+            regions = wanted(regions)
+        beliefs, report = tracker.step(beliefs, frame, regions)
+        if heed is not None:
+            state = heed(state, report)
+        yield Step(frame, regions, _with_events(regions, report))
+    yield Step(None, Regions.empty(), tracker.finish(beliefs))
+
+
+def _with_events(regions: Regions, report: Report) -> Report:
+    """A report with what the detector noticed before it."""
+    return replace(report, events=(*regions.events, *report.events)) if regions.events else report
 
 
 def settle(reports: Iterable[Report]) -> Tracks:

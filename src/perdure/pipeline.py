@@ -80,12 +80,17 @@ class Plan:
 
     def seen(self, frames: Iterable[Frame] | None = None) -> Iterator[tuple[Frame, Regions]]:
         """Yield every frame with its regions, of the wanted classes only."""
-        seen = fold.detect(self.source if frames is None else frames, self.detector, self.scene)
-        return _of_classes(seen, self.classes) if self.classes else seen
+        for frame, regions in fold.detect(self.source if frames is None else frames, self.detector, self.scene):
+            yield frame, self._wanted(regions)
 
     def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
         """Yield every step of the run, the finishing one last."""
-        return fold.track(self.seen(frames), self.tracker, self.scene)
+        given = self.source if frames is None else frames
+        return fold.run(given, self.detector, self.tracker, self.scene, self._wanted)
+
+    def _wanted(self, regions: Regions) -> Regions:
+        """The regions of the wanted classes."""
+        return regions.take(np.isin(regions.classes, self.classes)) if self.classes else regions
 
 
 def plan(
@@ -277,10 +282,3 @@ def _own_detections(source: Source) -> Path:
     there = sorted(str(one) for one in folder.glob("det*.txt"))
     hint = f"name one with --detector: {', '.join(there)}" if there else "name a file with --detector"
     raise ParameterError(f"{source.name} has no images and no det/det.txt; {hint}")
-
-
-def _of_classes(
-    seen: Iterable[tuple[Frame, Regions]], classes: tuple[str, ...]
-) -> Iterator[tuple[Frame, Regions]]:
-    for frame, regions in seen:
-        yield frame, regions.take(np.isin(regions.classes, classes))

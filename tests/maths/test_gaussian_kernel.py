@@ -25,6 +25,7 @@ def test_the_kernel_and_its_twin_agree_in_every_bit(seed, height, width):
     shade = rng.uniform(0.2, 1.1, (height, width, 1)).astype(np.float32)
     mean[alike] = np.clip(image * exposure / shade, 0, 400)[alike]
     variance = rng.uniform(0, 900, (height, width)).astype(np.float32)
+    held = rng.choice(np.uint8([0, 0, 1]), (height, width))
     numbers = [
         np.float32(value)
         for value in (
@@ -39,7 +40,8 @@ def test_the_kernel_and_its_twin_agree_in_every_bit(seed, height, width):
     results = []
     for function in (compare_and_learn, compare_and_learn_twin):
         state = mean.copy(), variance.copy(), *(np.full((height, width), 7, np.uint8) for _ in range(2))
-        function(image, exposure, *state, *numbers)
+        mean_of_it, variance_of_it, *written = state
+        function(image, exposure, mean_of_it, variance_of_it, held, *written, *numbers)
         results.append(state)
     for one, other in zip(*results, strict=True):
         np.testing.assert_array_equal(one, other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from perdure.files.lines import Line, line_at, mask_of_json, mask_to_json, read_
 from perdure.files.mot import read_detections
 from perdure.files.span import cut, shown
 from perdure.files.whole import whole_file
-from perdure.types import Frame, Mask, Regions
+from perdure.types import Event, Frame, Mask, Regions
 from perdure.types.regions import FARTHEST
 
 FORMAT, VERSION = "perdure-regions", 1
@@ -122,7 +123,14 @@ def _to_json(frame: Frame, regions: Regions) -> Any:
     value["scores"] = [short(score) for score in regions.scores]
     value["classes"] = [str(name) for name in regions.classes]
     value["masks"] = [mask_to_json(mask) if mask.bits.size else None for mask in regions.masks]
+    if regions.blind:
+        value["blind"] = True
+    if regions.events:
+        value["events"] = [{name: getattr(event, name) for name in _EVENT} for event in regions.events]
     return value
+
+
+_EVENT = ("kind", "begin", "end", "why")  # what a detector's event says
 
 
 def _of_line(value: Mapping[str, Any]) -> Regions:
@@ -141,12 +149,28 @@ def _of_line(value: Mapping[str, Any]) -> Regions:
     if not all(isinstance(one, str) for one in classes):
         raise ValueError("classes must be texts")
     masks = _column(value, "masks", [None] * len(boxes))
-    return Regions.of(
+    blind = value.get("blind", False)
+    if type(blind) is not bool:
+        raise ValueError("blind must be true or false")
+    regions = Regions.of(
         np.array(boxes, np.float32).reshape(-1, 4),
         scores,
         classes,
         [Mask.empty() if one is None else mask_of_json(one) for one in masks],
     )
+    return dataclasses.replace(regions, events=_events(value.get("events", [])), blind=blind)
+
+
+def _events(said: Any) -> tuple[Event, ...]:
+    """The events of a line."""
+    if not isinstance(said, list) or not all(isinstance(one, dict) and set(one) == set(_EVENT) for one in said):
+        raise ValueError(f"events must be a list of {{{', '.join(_EVENT)}}}")
+    for one in said:
+        if not all(isinstance(one[name], str) for name in ("kind", "why")):
+            raise ValueError("an event's kind and why must be texts")
+        if not all(type(one[name]) is int and 0 <= one[name] <= _LAST for name in ("begin", "end")):
+            raise ValueError(f"an event's begin and end must be frames, whole numbers from 0 on, up to {_LAST}")
+    return tuple(Event(**one) for one in said)
 
 
 def _column(value: Mapping[str, Any], name: str, default: list[Any]) -> list[Any]:

@@ -2,7 +2,7 @@
 
 Each target is expected where its last speed would bring it; regions are given to targets so that as many
 as possible overlap, and overlap most (Bewley et al. 2016, *SORT*, without its Kalman filter). A target not
-seen is kept for `patience` seconds; one seen for `confirm` seconds gets an id, and its first rows are said late.
+seen is kept for `patience` seconds, which do not pass while the detector is blind; one seen for `confirm` seconds gets an id, and its first rows are said late.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ class OverlapState:
     speed: NDArray[np.float32]  # (N, 2) px/s
     born: NDArray[np.float64]  # (N,) s, first seen
     seen: NDArray[np.float64]  # (N,) s, last seen
+    missed: NDArray[np.float64]  # (N,) s for which it might have been seen since, and was not
     unsaid: tuple[Tracks, ...]  # N; rows earned before the id
     next_id: int
+    time: float  # s, of the last frame
     scene_size: tuple[int, int]  # height, width
 
 
@@ -52,7 +54,7 @@ class Overlap:
         """Return the state without a target."""
         none, places = np.zeros(0), np.zeros((0, 4), np.float32)
         size = (scene.height, scene.width)
-        return OverlapState(none.astype(np.int64), places, places[:, :2], none, none, (), 1, size)
+        return OverlapState(none.astype(np.int64), places, places[:, :2], none, none, none, (), 1, 0.0, size)
 
     def step(self, state: OverlapState, frame: Frame, regions: Regions) -> tuple[OverlapState, Report]:
         """Predict, match, update, give birth, say, retire."""
@@ -63,8 +65,11 @@ class Overlap:
         link = np.full(len(state.ids), -1)  # the region of each target
         link[pairs[:, 0]] = pairs[:, 1]
         link[len(link) - len(unmatched) :] = unmatched
+        waited = 0.0 if regions.blind else frame.time - state.time
+        missed = np.where(link >= 0, 0.0, state.missed + waited)
+        state = replace(state, missed=missed, time=frame.time)
         state, rows, events = self._say(state, frame, regions, link)
-        state, left = self._retire(state, frame, link)
+        state, left = self._retire(state, frame, link, regions.blind)
         return state, Report(rows, events=(*events, *left))
 
     def finish(self, state: OverlapState) -> Report:
@@ -104,7 +109,7 @@ class Overlap:
 
     def _rows(self, state: OverlapState, frame: Frame, regions: Regions, link: NDArray[np.intp]) -> Tracks:
         """Return a row for every target; an unseen one is LOST, where it is expected, less and less surely."""
-        hope = 1.0 - (frame.time - state.seen) / max(self.patience, 1e-6)
+        hope = 1.0 - state.missed / max(self.patience, 1e-6)
         seen = link >= 0
         masks = disjoint([(*regions.masks, Mask.empty())[j] for j in link], *state.scene_size)
         return Tracks.of(
@@ -121,12 +126,14 @@ class Overlap:
         )
 
     def _retire(
-        self, state: OverlapState, frame: Frame, link: NDArray[np.intp]
+        self, state: OverlapState, frame: Frame, link: NDArray[np.intp], blind: bool
     ) -> tuple[OverlapState, list[Event]]:
         """Let go of targets not seen for `patience` seconds, and of unconfirmed ones at the first miss."""
-        kept = np.where(state.ids > 0, frame.time - state.seen <= self.patience, link >= 0)
+        kept = np.where(state.ids > 0, state.missed <= self.patience + 1e-9, (link >= 0) | blind)
         left = [Event("left", frame.index, frame.index, (int(one),)) for one in state.ids[~kept & (state.ids > 0)]]
-        columns = {name: getattr(state, name)[kept] for name in ("ids", "boxes", "speed", "born", "seen")}
+        columns = {
+            name: getattr(state, name)[kept] for name in ("ids", "boxes", "speed", "born", "seen", "missed")
+        }
         return replace(state, **columns, unsaid=tuple(state.unsaid[i] for i in np.flatnonzero(kept))), left
 
 
@@ -147,5 +154,6 @@ def _give_birth(state: OverlapState, time: float, boxes: Boxes) -> OverlapState:
         speed=np.concatenate([state.speed, np.zeros((count, 2), np.float32)]),
         born=np.concatenate([state.born, now]),
         seen=np.concatenate([state.seen, now]),
+        missed=np.concatenate([state.missed, np.zeros(count)]),
         unsaid=state.unsaid + (Tracks.empty(),) * count,
     )

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from perdure.types.arrays import Boxes, as_boxes, check_lengths, frozen, row_index, same_columns
 from perdure.types.frame import Mask
+from perdure.types.report import Event
 
 FARTHEST = 1e6  # px
 
@@ -31,6 +32,10 @@ class Regions:
         Empty masks where the detector gives none.
     data : mapping of str to (N, ...) arrays
         Whatever else the detector said; kept, never read.
+    events : tuple of Event
+        What the detector noticed of the place: the light changed, a thing was left behind.
+    blind : bool
+        Nothing could be seen (the light has just gone): that a thing is missing among the regions means nothing.
     """
 
     boxes: Boxes
@@ -38,6 +43,8 @@ class Regions:
     classes: NDArray[np.str_]
     masks: tuple[Mask, ...]
     data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+    blind: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "boxes", as_boxes(self.boxes))
@@ -93,8 +100,11 @@ class Regions:
             self.classes[index],
             tuple(self.masks[i] for i in index),
             {key: np.asarray(values)[index] for key, values in self.data.items()},
+            self.events,
+            self.blind,
         )
 
     def equals(self, other: Regions) -> bool:
         """Return whether both say the same, `data` apart."""
-        return same_columns(self, other, ("boxes", "scores", "classes", "masks"))
+        said = self.events == other.events and self.blind == other.blind
+        return said and same_columns(self, other, ("boxes", "scores", "classes", "masks"))

@@ -20,6 +20,7 @@ def compare_and_learn(
     exposure: Single,
     mean: Single,
     variance: Single,
+    held: NDArray[np.uint8],
     foreground: NDArray[np.uint8],
     contrast: NDArray[np.uint8],
     squared_threshold: np.float32,
@@ -44,6 +45,8 @@ def compare_and_learn(
         Grey levels.
     variance : (H, W) float32, changed
         Mean over the channels, in squared grey levels.
+    held : (H, W) uint8
+        Where it is not 0 the model learns nothing.
     foreground : (H, W) uint8, changed
         Every element is written.
     contrast : (H, W) uint8, changed
@@ -61,6 +64,7 @@ def compare_and_learn(
     first, second, last = exposure[0], exposure[1], exposure[2]
     colours, means = image.reshape(-1), mean.reshape(-1)  # (3 H W,), views: one flat loop becomes vector code
     variances, marks, contrasts = variance.reshape(-1), foreground.reshape(-1), contrast.reshape(-1)  # (H W,)
+    closed = held.reshape(-1)
     for i in range(variances.shape[0]):
         red = np.float32(colours[3 * i]) * first - means[3 * i]
         green = np.float32(colours[3 * i + 1]) * second - means[3 * i + 1]
@@ -81,8 +85,9 @@ def compare_and_learn(
         moving = far & ~shadow
         marks[i] = (DARKENED if darkened else MOVING) if moving else (SHADOW if far else (WEAK if weak else 0))
         contrasts[i] = np.uint8(min(np.sqrt(squared), np.float32(255.0)))
-        step = foreground_rate if moving else rate
-        variances[i] = known + (np.float32(0.0) if moving else rate * (squared - known))
+        usual = np.float32(0.0) if closed[i] else rate
+        step = (np.float32(0.0) if closed[i] else foreground_rate) if moving else usual
+        variances[i] = known + (np.float32(0.0) if moving else usual * (squared - known))
         means[3 * i] += step * red
         means[3 * i + 1] += step * green
         means[3 * i + 2] += step * blue
@@ -93,6 +98,7 @@ def compare_and_learn_twin(
     exposure: Single,
     mean: Single,
     variance: Single,
+    held: NDArray[np.uint8],
     foreground: NDArray[np.uint8],
     contrast: NDArray[np.uint8],
     squared_threshold: np.float32,
@@ -119,5 +125,6 @@ def compare_and_learn_twin(
     moving = far & ~shadow
     foreground[...] = np.select([moving & darkened, moving, far, weak], [DARKENED, MOVING, SHADOW, WEAK])
     contrast[...] = np.minimum(np.sqrt(squared), np.float32(255.0)).astype(np.uint8)
-    variance += np.where(moving, np.float32(0.0), rate * (squared - variance))
-    mean += np.where(moving, foreground_rate, rate)[..., None] * difference
+    usual = np.where(held != 0, np.float32(0.0), rate)
+    variance += np.where(moving, np.float32(0.0), usual * (squared - variance))
+    mean += np.where(moving & (held == 0), foreground_rate, usual)[..., None] * difference
