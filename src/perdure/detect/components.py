@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -52,14 +52,14 @@ def regions_of(
     mean : (H, W, 3) float32 or None
         The model's mean picture, which tells what may stand in front; None: not known.
     """
-    seen = smooth(foreground)
+    seen, sure = smooth(foreground)
     if roi is not None:
         seen = np.where(roi, seen, np.uint8(0))
     found = components(close(seen, stage.closing), _PIECE * stage.least_area, hole=stage.hole)
     bodies = [
         part
         for mask in found.masks
-        for part in (told_apart(mask, seen, stage) if stage.neck and mask.area >= stage.least_area else [mask])
+        for part in (told_apart(mask, sure, stage) if stage.neck and mask.area >= stage.least_area else [mask])
     ]
     masks = [
         mask
@@ -69,15 +69,22 @@ def regions_of(
     return Regions.of(np.array([mask.box for mask in masks], np.float32), masks=masks)
 
 
-def smooth(foreground: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Keep what most of each 5x5 neighbourhood says, 0 or 255; what is doubtful only where moving pixels enclose it."""
+class Smoothed(NamedTuple):
+    """What most of each 5x5 neighbourhood says; 0 or 255."""
+
+    seen: NDArray[np.uint8]  # (H, W) with what is doubtful where moving pixels enclose it
+    sure: NDArray[np.uint8]  # (H, W) without
+
+
+def smooth(foreground: NDArray[np.uint8]) -> Smoothed:
+    """Keep what most of each 5x5 neighbourhood says; what is doubtful only where moving pixels enclose it."""
     from perdure.maths.kernels.enclosed import enclosed
 
-    seen = np.zeros_like(foreground)
+    seen, certain = np.zeros_like(foreground), np.zeros_like(foreground)
     moving = cv2.threshold(foreground, 254, 255, cv2.THRESH_BINARY)[1]
     x, y, width, height = cv2.boundingRect(moving)
     if not width:
-        return seen
+        return Smoothed(seen, certain)
     reach = _MAJORITY // 2
     rim = (  # outside of it nothing is seen
         slice(max(0, y - reach), y + height + reach),
@@ -88,7 +95,8 @@ def smooth(foreground: NDArray[np.uint8]) -> NDArray[np.uint8]:
     doubtful = np.maximum(sure, some & 127)  # 0, 127, 255
     enclosed(doubtful, np.empty_like(doubtful))
     seen[rim] = cv2.threshold(doubtful, 254, 255, cv2.THRESH_BINARY)[1]
-    return seen
+    certain[rim] = sure
+    return Smoothed(seen, certain)
 
 
 def close(seen: NDArray[np.uint8], closing: int) -> NDArray[np.uint8]:
@@ -104,18 +112,18 @@ def close(seen: NDArray[np.uint8], closing: int) -> NDArray[np.uint8]:
     return closed
 
 
-def told_apart(mask: Mask, seen: NDArray[np.uint8], stage: Stage) -> list[Mask]:
-    """Return the bodies of a region that hang together by a neck only, or by a gap that was closed; else the region.
+def told_apart(mask: Mask, sure: NDArray[np.uint8], stage: Stage) -> list[Mask]:
+    """Return the bodies of a region that hang together by a neck only, by shadow or by a closed gap; else the region.
 
     Bodies are of like thickness and area: legs, heads and wings are none.
     """
     x1, y1, x2, y2 = mask.box
     step = max(1, math.isqrt(mask.bits.size // _DETAIL))  # a large region is looked at more coarsely
     bits = np.pad(mask.bits[::step, ::step], 1)
-    firm = bits & np.pad(seen[y1:y2:step, x1:x2:step] > 0, 1)
+    firm = bits & np.pad(sure[y1:y2:step, x1:x2:step] > 0, 1)
     distance = cv2.distanceTransform(firm.view(np.uint8), cv2.DIST_L2, 3)
     relief = np.minimum(4.0 * distance, 65535.0).astype(np.uint16)
-    relief[bits & (relief == 0)] = 1  # what was closed joins, but at the lowest
+    relief[bits & (relief == 0)] = 1  # what was filled or closed joins, but at the lowest
     if relief.max() < 4.0 * _LEAST_THICKNESS:
         return [mask]
     from perdure.maths.kernels.basins import basins

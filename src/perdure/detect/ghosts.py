@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.types import Bits, Image, Regions
+from perdure.types import Bits, Image, Mask, Regions
 
 Single = NDArray[np.float32]
 
@@ -30,10 +30,15 @@ def ghosts(regions: Regions, image: Image, mean: Single) -> Bits:
     mean : (H, W, 3) float32
         The model's.
     """
-    return np.array([_is_ghost(mask.bits, mask.y, mask.x, image, mean) for mask in regions.masks], np.bool_)
+    some = np.zeros(image.shape[:2], np.uint8)  # of any region
+    for mask in regions.masks:
+        x1, y1, x2, y2 = mask.box
+        np.maximum(some[y1:y2, x1:x2], mask.bits, out=some[y1:y2, x1:x2])
+    return np.array([_is_ghost(mask, some, image, mean) for mask in regions.masks], np.bool_)
 
 
-def _is_ghost(bits: Bits, y: int, x: int, image: Image, mean: Single) -> bool:
+def _is_ghost(mask: Mask, some: NDArray[np.uint8], image: Image, mean: Single) -> bool:
+    bits, y, x = mask.bits, mask.y, mask.x
     top, left = min(y, _MARGIN), min(x, _MARGIN)
     height, width = bits.shape
     inside = np.zeros(
@@ -42,8 +47,16 @@ def _is_ghost(bits: Bits, y: int, x: int, image: Image, mean: Single) -> bool:
     )
     inside[top : top + height, left : left + width] = bits
     part = np.s_[y - top : y - top + inside.shape[0], x - left : x - left + inside.shape[1]]
-    ring = cv2.morphologyEx(inside, cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)) > 0
-    seen, known = (_slope(picture[part])[ring].mean() if ring.any() else 0.0 for picture in (image, mean))
+    ring = cv2.morphologyEx(inside, cv2.MORPH_GRADIENT, _NEAR) > 0
+    others = some[part] & ~inside & 1
+    if others.any():  # where bodies were told apart there is no border of a thing
+        whole = np.count_nonzero(ring)
+        ring &= cv2.dilate(others, _NEAR) == 0
+        if 2 * np.count_nonzero(ring) < whole:
+            return False
+    if not ring.any():
+        return False
+    seen, known = (_slope(picture[part])[ring].mean() for picture in (image, mean))
     return bool(known > _STEEPER * seen + _LEAST_SLOPE)
 
 
@@ -55,6 +68,7 @@ def _slope(picture: NDArray[Any]) -> Single:
     return np.maximum(np.maximum(steep[..., 0], steep[..., 1]), steep[..., 2])  # quicker than a reduction
 
 
+_NEAR = np.ones((5, 5), np.uint8)
 _MARGIN = 3  # pixels around a region
 _STEEPER = 1.2  # how much steeper a ghost's border is in the model than in the picture
 _LEAST_SLOPE = 1.0  # grey levels a pixel
