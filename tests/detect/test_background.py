@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from worlds import Block, World, lone_walker, walk
 
-from perdure.detect.background import Background, exposure, look_over
+from perdure.detect.background import Background
+from perdure.detect.first_look import exposure, look_over
 from perdure.errors import ParameterError
 from perdure.types import Frame, Regions, Scene
 
@@ -46,10 +47,10 @@ def test_live_a_ghost_is_gone_within_a_second_or_two():
 
 
 def test_what_is_taken_away_heals_and_what_is_left_behind_stays():
-    left = Block(lambda k: (20, 30) if k >= 5 else None)
-    taken = Block(lambda k: (80, 30) if k < 5 else None)
-    found = regions_of(World((left, taken), count=60))
-    assert [len(regions) for regions in found[30:]] == [1] * 30
+    left = Block(lambda k: (20, 30) if k >= 50 else None)
+    taken = Block(lambda k: (80, 30) if k < 50 else None)
+    found = regions_of(World((left, taken), count=100))
+    assert [len(regions) for regions in found[70:]] == [1] * 30
     assert found[-1].boxes[0][0] < 40
 
 

@@ -14,33 +14,25 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.detect.components import Stage, regions_of
+from perdure.detect.first_look import Early, FirstLook, exposed, exposure, has_colour, look_over
 from perdure.detect.ghosts import ghosts
 from perdure.detect.light import Light, busier, followed, is_sudden, relit
 from perdure.detect.marks import Ground, take_off_halo, take_out_shadows
 from perdure.detect.occluders import Occluder, Passages, no_passages, note, occluders
-from perdure.detect.stillness import Stillness, no_stillness, rested, watch
+from perdure.detect.steady import blank, moved, shift, steadied
+from perdure.detect.stillness import Stillness, is_first, no_stillness, rested, watch
 from perdure.errors import ParameterError
 from perdure.params import parameter
 from perdure.types import Event, Frame, Image, Mask, Regions, Report, Scene, Status
 
 Single = NDArray[np.float32]
-
-
-@dataclass(frozen=True, eq=False)
-class FirstLook:
-    """What a look over the whole file gave: the median picture and its noise."""
-
-    mean: Single  # (H, W, 3) grey levels
-    variance: Single  # (H, W) squared grey levels, mean over channels
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +42,8 @@ class BackgroundState:
     mean: Single  # (H, W, 3)
     variance: Single  # (H, W)
     held: NDArray[np.uint8]  # (H, W), not 0 where a target is believed
+    early: Early
     still: Stillness
-    mended: NDArray[np.float64]  # (h, w) s, when a ghost was last taken in, on the grid of `still`
     passages: Passages
     light: Light
     age: float  # seconds learnt so far
@@ -106,6 +98,7 @@ class Background:
         low=0.0,
         high=1.0,
     )
+    steady: bool = parameter(True, "whether a shaking camera is held still")
     first_look: FirstLook | None = field(default=None, repr=False, compare=False)
 
     needs_pixels = True
@@ -119,13 +112,25 @@ class Background:
 
     def start(self, scene: Scene) -> BackgroundState:
         """Return the state before the first frame: nothing learnt, or the first look."""
-        mean, variance, age = np.zeros((0, 0, 3), np.float32), np.zeros((0, 0), np.float32), 0.0
-        if self.first_look is not None:
-            mean, variance, age = self.first_look.mean.copy(), self.first_look.variance.copy(), self.absorb
-        place = _place(*mean.shape[:2])
-        return BackgroundState(
-            mean, variance, *place, Light(), age, -1.0 / scene.fps, scene.roi, scene.height, scene.fps
+        pixels, look = np.zeros((0, 0), np.float32), self.first_look
+        state = BackgroundState(
+            mean=np.zeros((0, 0, 3), np.float32),
+            variance=pixels,
+            held=pixels.astype(np.uint8),
+            early=Early.none_yet(0, 0),
+            still=no_stillness(0, 0),
+            passages=no_passages(0, 0),
+            light=Light(),
+            age=0.0,
+            time=-1.0 / scene.fps,
+            roi=scene.roi,
+            height=scene.height,
+            fps=scene.fps,
         )
+        if look is None:
+            return state
+        state = _placed(state, look.mean.copy(), look.variance.copy())
+        return dataclasses.replace(state, early=Early.no_more(*look.variance.shape), age=self.absorb)
 
     def step(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, Regions]:
         """Return the regions of one frame, with what was noticed of light and left things; the model learns from it.
@@ -142,6 +147,7 @@ class Background:
         found = regions_of(seen.foreground, stage, state.roi, state.mean)
         note(state.passages, found, seen.elapsed)
         events = (*seen.events, *self._tend(state, found, seen, frame))
+        found = moved(found, *seen.place, *seen.foreground.shape)
         return state, dataclasses.replace(found, events=events)
 
     def heed(self, state: BackgroundState, report: Report) -> BackgroundState:
@@ -171,33 +177,32 @@ class Background:
     def foreground(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, NDArray[np.uint8]]:
         """Return the raw foreground of one frame, (H, W): 255 moving, 0 not, else doubtful; the model learns."""
         state, seen = self._see(state, frame)
-        return state, seen.foreground
+        x, y = seen.place
+        return state, steadied(seen.foreground, -round(x), -round(y)) if round(x) or round(y) else seen.foreground
 
     def _see(self, state: BackgroundState, frame: Frame) -> tuple[BackgroundState, _Seen]:
         if frame.image is None:
             raise ParameterError("the background detector needs pictures; give --detector a file of detections")
-        image = np.ascontiguousarray(frame.image)
+        image, place = np.ascontiguousarray(frame.image), (0.0, 0.0)
         if not state.mean.size:
-            state = self._begun(state, image)
+            noise = np.full(image.shape[:2], self.least_noise**2, np.float32)
+            state = _placed(state, image.astype(np.float32), noise)
         elapsed = max(frame.time - state.time, 0.1 / state.fps)
         factor = exposure(image, state.mean)
+        if self.steady:
+            place = shift(image, state.mean, factor)
+        if place != (0.0, 0.0):
+            image = steadied(image, *place)
         foreground = self._compare_and_learn(state, image, factor, elapsed)
+        blank(foreground, *place)
         light, events = followed(state.light, factor, frame.index, frame.time, elapsed)
         state = dataclasses.replace(state, light=light, age=state.age + elapsed, time=frame.time)
-        seen = _Seen(image, factor, foreground, elapsed, events if state.age > _SETTLED else ())
+        seen = _Seen(image, factor, place, foreground, elapsed, events if state.age > _SETTLED else ())
         busy = _moving(foreground)
         if light.blind >= 0 or (state.age > _SETTLED and is_sudden(light, busy, jumped=bool(events))):
             return self._in_new_light(state, seen, frame, busy)
-        return dataclasses.replace(state, light=busier(light, busy, elapsed)), seen
-
-    def _begun(self, state: BackgroundState, image: Image) -> BackgroundState:
-        """The state that knows one picture."""
-        first = np.full(image.shape[:2], self.least_noise**2, np.float32)
-        held, still, mended, passages = _place(*image.shape[:2])
-        mean = image.astype(np.float32)
-        return dataclasses.replace(
-            state, mean=mean, variance=first, held=held, still=still, mended=mended, passages=passages
-        )
+        state = dataclasses.replace(state, light=busier(light, busy, elapsed))
+        return self._with_early_look(state, image), seen
 
     def _compare_and_learn(
         self, state: BackgroundState, image: Image, factor: Single, elapsed: float
@@ -206,7 +211,7 @@ class Background:
         from perdure.maths.kernels.gaussian import compare_and_learn
 
         foreground, contrast = (np.empty(image.shape[:2], np.uint8) for _ in range(2))
-        darkest = self.darkest_shadow if _has_colour(image) else 1.0
+        darkest = self.darkest_shadow if has_colour(image) else 1.0
         young = elapsed / (state.age + elapsed)  # a plain mean as long as little is known
         compare_and_learn(
             image,
@@ -227,6 +232,23 @@ class Background:
         take_off_halo(foreground, contrast)
         return foreground
 
+    def _with_early_look(self, state: BackgroundState, image: Image) -> BackgroundState:
+        """Look over the first seconds as they go by: what stood in the first picture may have moved on.
+
+        Where a target is believed the ground is as the model has it.
+        """
+        if state.early.is_over or state.time < state.early.due:
+            return state
+        believed = state.held != 0
+        ground = np.where(believed[..., None], np.rint(state.mean / exposure(image, state.mean)), image)
+        early, look = state.early.with_picture(ground.clip(0, 255).astype(np.uint8), state.time)
+        if look is None:
+            return dataclasses.replace(state, early=early)
+        np.copyto(look.mean, state.mean, where=believed[..., None])
+        np.copyto(look.variance, state.variance, where=believed)
+        light = dataclasses.replace(state.light, level=-float(np.log(exposure(image, look.mean)).mean()))
+        return dataclasses.replace(state, mean=look.mean, variance=look.variance, light=light, early=early)
+
     def _in_new_light(
         self, state: BackgroundState, seen: _Seen, frame: Frame, busy: float
     ) -> tuple[BackgroundState, _Seen]:
@@ -243,7 +265,8 @@ class Background:
         if not is_sudden(light, _moving(foreground)) and _moving(foreground) < busy / 2:
             why = f"{busy:.0%} of the picture changed at once; the model was brought to the new light"
             seen = self._told(seen._replace(foreground=foreground), begun, frame, why)
-            return dataclasses.replace(trial, light=sees), seen
+            early = state.early if state.early.is_over else Early.none_yet(*state.held.shape)
+            return dataclasses.replace(trial, light=sees, early=early), seen
         if not is_sudden(light, busy):
             return dataclasses.replace(state, light=busier(light, busy, seen.elapsed)), seen
         if begun < 0:
@@ -255,7 +278,8 @@ class Background:
             return dataclasses.replace(state, light=light), seen
         fresh = np.where(state.held[..., None] != 0, mean, seen.image * seen.factor).astype(np.float32)
         noise = np.full(fresh.shape[:2], self.least_noise**2, np.float32)
-        state = dataclasses.replace(state, mean=fresh, variance=noise, light=sees, age=0.0)
+        early = Early.none_yet(*state.held.shape)
+        state = dataclasses.replace(state, mean=fresh, variance=noise, early=early, light=sees, age=0.0)
         foreground = self._compare_and_learn(state, seen.image, seen.factor, seen.elapsed)
         seen = seen._replace(foreground=foreground)
         return state, self._told(seen, begun, frame, "the picture has settled; the model is learnt anew")
@@ -267,9 +291,9 @@ class Background:
 
     def _tend(self, state: BackgroundState, found: Regions, seen: _Seen, frame: Frame) -> tuple[Event, ...]:
         """Take in the places of things that are gone, within a second, and things that were left and lie still."""
-        steady = _exposed(seen.image, seen.factor) if (seen.factor != 1.0).any() else seen.image
+        lit = exposed(seen.image, seen.factor) if (seen.factor != 1.0).any() else seen.image
         gone = ghosts(found, seen.image, state.mean)
-        watch(state.still, found, steady, frame.time, self.threshold * self.least_noise)
+        watch(state.still, found, lit, frame.time, self.threshold * self.least_noise)
         lies = rested(state.still, found, frame.time, self.absorb) & ~gone
         events = []
         for number in np.flatnonzero(gone | lies):
@@ -277,19 +301,10 @@ class Background:
             x1, y1, x2, y2 = mask.box
             known = state.mean[y1:y2, x1:x2]
             share = np.float32(1.0 if lies[number] else _share(seen.elapsed, _HEALED))
-            known[mask.bits] += share * (steady[y1:y2, x1:x2][mask.bits] - known[mask.bits])
-            if lies[number] or self._is_new(state, mask, frame.time):
+            known[mask.bits] += share * (lit[y1:y2, x1:x2][mask.bits] - known[mask.bits])
+            if lies[number] or is_first(state.still, mask, frame.time):
                 events.append(_noticed(mask, frame.index, "abandoned" if lies[number] else "removed"))
         return tuple(events)
-
-    def _is_new(self, state: BackgroundState, mask: Mask, time: float) -> bool:
-        """Whether no ghost has just been taken in here; from now on one has."""
-        cell = state.still.cell
-        x1, y1, x2, y2 = mask.box
-        here = state.mended[y1 // cell : -(-y2 // cell), x1 // cell : -(-x2 // cell)]
-        fresh = bool((here < time - _MENDED).all())
-        here.fill(time)
-        return fresh
 
 
 class _Seen(NamedTuple):
@@ -297,16 +312,24 @@ class _Seen(NamedTuple):
 
     image: Image  # (H, W, 3)
     factor: Single  # (3,) what brings it to the model's exposure
+    place: tuple[float, float]  # px by which the camera had moved; the picture has been moved back
     foreground: NDArray[np.uint8]  # (H, W)
     elapsed: float  # seconds since the frame before
     events: tuple[Event, ...] = ()
 
 
-def _place(height: int, width: int) -> tuple[NDArray[np.uint8], Stillness, NDArray[np.float64], Passages]:
-    """What is known of a place before anything is seen there."""
-    still = no_stillness(height, width)
-    mended = np.full(still.since.shape, -math.inf)
-    return np.zeros((height, width), np.uint8), still, mended, no_passages(height, width)
+def _placed(state: BackgroundState, mean: Single, variance: Single) -> BackgroundState:
+    """A state that knows its place."""
+    size = variance.shape
+    return dataclasses.replace(
+        state,
+        mean=mean,
+        variance=variance,
+        held=np.zeros(size, np.uint8),
+        early=Early.none_yet(*size),
+        still=no_stillness(*size),
+        passages=no_passages(*size),
+    )
 
 
 def _moving(foreground: NDArray[np.uint8]) -> float:
@@ -328,78 +351,10 @@ def _share(elapsed: float, time: float) -> float:
     return 1.0 - math.exp(-elapsed / time)
 
 
-def look_over(images: NDArray[np.uint8]) -> FirstLook:
-    """Return median and noise of pictures spread over a film, (N, H, W, 3) uint8.
-
-    All are first brought to one exposure, that of their median, so that a slow change of light is not taken for
-    noise. The noise is that of the quieter third: a low quantile of the deviations from the median, scaled to a
-    Gaussian's standard deviation; where things pass for half of the time it is still that of the background.
-    """
-    images = images[: len(images) - (1 - len(images) % 2)]  # an odd number: the median is one of them
-    mean, _ = _median_and_noise(images)
-    factors = [exposure(image, mean) for image in images]
-    if any((factor != 1.0).any() for factor in factors):
-        images = np.stack([_exposed(image, factor) for image, factor in zip(images, factors, strict=True)])
-    mean, variance = _median_and_noise(images)
-    return FirstLook(mean, variance)
-
-
-def _median_and_noise(images: NDArray[np.uint8]) -> tuple[Single, Single]:
-    """The median (H, W, 3) and the squared noise (H, W) of an odd number of pictures."""
-    half, low = len(images) // 2, round(_QUIET * (len(images) - 1))
-    mean = np.empty(images.shape[1:], np.float32)
-    variance = np.empty(images.shape[1:3], np.float32)
-
-    def look(y: int) -> None:
-        strip = images[:, y : y + _STRIP]  # (N, strip, W, 3)
-        middle = np.partition(strip, half, axis=0)[half]
-        deviation = np.partition(np.maximum(strip, middle) - np.minimum(strip, middle), low, axis=0)[low]
-        mean[y : y + _STRIP] = middle
-        variance[y : y + _STRIP] = np.square(deviation * _GAUSSIAN).mean(axis=2)
-
-    with ThreadPoolExecutor(2) as threads:  # strips that stay in the cache; each writes its own rows
-        list(threads.map(look, range(0, images.shape[1], _STRIP)))
-    return mean, variance
-
-
-def _exposed(image: Image, factor: Single) -> Image:
-    """A picture whose channels are multiplied, in whole grey levels."""
-    levels = np.arange(256, dtype=np.float32)[:, None] * factor  # (256, 3)
-    table = np.clip(np.rint(levels), 0, 255).astype(np.uint8)
-    return np.asarray(cv2.LUT(image, table[None]), np.uint8)
-
-
-def exposure(image: Image, mean: Single) -> Single:
-    """Return the factor per channel (3,) that brings a picture to the model's exposure.
-
-    The median of mean / image over a coarse grid: right as long as less than half of it is foreground.
-    Within one percent it is 1, so that a still scene stays untouched.
-    """
-    step = max(1, min(image.shape[:2]) // _GRID)
-    seen = image[::step, ::step].astype(np.float32)
-    factors = np.median(np.maximum(mean[::step, ::step], 1.0) / np.maximum(seen, 1.0), axis=(0, 1))
-    return np.where(np.abs(factors - 1.0) < 0.01, 1.0, factors).astype(np.float32)
-
-
 _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
 _FAINT = 0.8  # of the ground's brightness: so faint a shadow need not be even
 _HOLE = 0.05  # of a region's area: smaller holes in it are filled
 _SETTLED = 1.0  # s of learning before a jump of the light is one
 _WAIT = 0.2  # s for which a picture that no light explains may last before it is learnt anew
 _SEEN = (Status.VISIBLE, Status.PARTLY_OCCLUDED, Status.AMBIGUOUS)
-_MENDED = 5.0  # s within which a ghost in the same place is the same
 _HEALED = 0.4  # s over which a ghost is taken in
-_STRIP = 32  # rows
-_GRID = 32  # rows of the grid on which the exposure is measured
-_GREY = 4  # grey levels that the channels of a colourless picture may differ by
-_QUIET = (
-    0.3  # quantile of the deviations that tells the noise: traffic may hide the background for longer than half
-)
-_GAUSSIAN = 1 / 0.3853  # standard deviation of a Gaussian / that quantile of its absolute deviations
-
-
-def _has_colour(image: Image) -> bool:
-    """Whether a picture has colour at all; in a grey one nothing tells a shadow from a dark thing."""
-    step = max(1, min(image.shape[:2]) // _GRID)
-    seen = image[::step, ::step].astype(np.int16)
-    return bool((np.ptp(seen, axis=2) > _GREY).any())

@@ -21,13 +21,14 @@ class Stillness:
     cell: int  # pixels between two of them
     seen: NDArray[np.int16]  # (h, w, 3) grey levels last taken in
     since: NDArray[np.float64]  # (h, w) s, when that was, or when the place was last free
+    taken: NDArray[np.float64]  # (h, w) s, when a thing here was last found to be gone
 
 
 def no_stillness(height: int, width: int) -> Stillness:
     """Return the state before the first frame of pictures of this size."""
     cell = max(1, round(min(height, width) / _GRID))
     shape = -(-height // cell), -(-width // cell)
-    return Stillness(cell, np.zeros((*shape, 3), np.int16), np.zeros(shape))
+    return Stillness(cell, np.zeros((*shape, 3), np.int16), np.zeros(shape), np.full(shape, -np.inf))
 
 
 def watch(still: Stillness, regions: Regions, image: Image, time: float, tolerance: float) -> None:
@@ -70,6 +71,15 @@ def rested(still: Stillness, regions: Regions, time: float, least: float) -> Bit
     return found
 
 
+def is_first(still: Stillness, mask: Mask, time: float) -> bool:
+    """Return whether nothing has just been found to be gone here; from now on something has."""
+    x1, y1, x2, y2 = mask.box
+    here = still.taken[y1 // still.cell : -(-y2 // still.cell), x1 // still.cell : -(-x2 // still.cell)]
+    fresh = bool((here < time - _SAME).all())
+    here.fill(time)
+    return fresh
+
+
 def _on_grid(mask: Mask, cell: int) -> tuple[tuple[slice, slice], Bits]:
     """The cells of a mask, as a part of the grid and their bits."""
     top, left = -(-mask.y // cell), -(-mask.x // cell)
@@ -77,5 +87,6 @@ def _on_grid(mask: Mask, cell: int) -> tuple[tuple[slice, slice], Bits]:
     return np.s_[top : top + bits.shape[0], left : left + bits.shape[1]], bits
 
 
+_SAME = 5.0  # s within which what is gone from one place is the same thing
 _GRID = 288  # cells along the shorter side
 _ASLEEP = 0.9  # of a region's cells: a head that turns is more than the rest
