@@ -31,6 +31,10 @@ A composite's truth boxes are amodal (gt/gt.txt): a hidden object is sought too,
 PETS's truth leaves out some people who are far away or half in the picture: precision has a ceiling there.
 A share of nothing (no region, no truth) is 0.
 
+Changes of light: where a composite's clip.json tells the light's gain of every frame, false pixels of the regions a frame
+that lie outside of the truth boxes (grown as above), mean over the second before a change and over the second that begins two seconds after it. A change begins where the
+gain has gone .02 from where it stood and ends where it is within .02 of the next turning point.
+
 Time: on the first clip of each group, in a pass of its own, all methods and MOG2 take turns on each decoded
 frame; medians over frames 26 to 100. `foreground` is the model alone, `regions` with the stage behind it.
 Threads are as each library has them by default.
@@ -83,6 +87,9 @@ CLIPS = (*CDNET, PETS, *COMPOSITES)
 
 SETTLING = 25  # frames at the beginning of a video that are not scored
 TIMED = 100  # frames, of which the first SETTLING warm up
+SMALL = 0.02  # of the light's gain: no change yet
+WINDOW, AFTER = 1.0, 2.0  # s: false pixels are counted for so long, before a change and so long after it
+LEAST = 5  # scored frames before and after
 SAME = 0.5  # IoU from which a region is a truth box's
 GROWTH = 0.1  # of its size, by which a box grows before it may be isolated
 ROOT = Path(__file__).parents[1]
@@ -243,11 +250,16 @@ def paired(found: Boxes, sought: Boxes) -> Assignment:
 def isolated(sought: Sought) -> Bits:
     """Return which of the counted boxes share no area with any other box, each grown by GROWTH."""
     boxes = np.concatenate([sought.counted, sought.ignored])
-    middle, half = centres(boxes), sizes(boxes) * (1 + GROWTH) / 2
-    grown = np.concatenate([middle - half, middle + half], axis=1)
-    meets = intersections(grown, grown) > 0
+    larger = grown(boxes)
+    meets = intersections(larger, larger) > 0
     np.fill_diagonal(meets, False)
     return ~meets[: len(sought.counted)].any(axis=1)
+
+
+def grown(boxes: Boxes) -> Boxes:
+    """Return boxes grown by GROWTH about their centres."""
+    middle, half = centres(boxes), sizes(boxes) * (1 + GROWTH) / 2
+    return np.concatenate([middle - half, middle + half], axis=1)
 
 
 def union(regions: Regions, height: int, width: int) -> Bits:
@@ -321,6 +333,14 @@ def start(method: str, source: Source) -> Method:
 # Clips and their truth
 
 
+class Change(NamedTuple):
+    """A change of light; frames from 0."""
+
+    begin: int
+    end: int
+    gain: float  # brightness after it, of that before it
+
+
 @dataclass(frozen=True)
 class Clip:
     """A video and its truth; a truth frame's number is the video's index plus `begins`."""
@@ -332,6 +352,7 @@ class Clip:
     numbers: range  # of the frames that have truth
     labels: Callable[[int], Labels] | None = None
     sought: Callable[[int], Sought] | None = None
+    changes: tuple[Change, ...] = ()
 
     def scored(self, index: int) -> bool:
         """Return whether a video frame is scored."""
@@ -355,7 +376,23 @@ def open_clip(data: Path, name: str) -> Clip | None:
         return Clip(name, name, folder / "video.avi", 1, range(1, boxes.last + 1), sought=boxes)
     told = json.loads((folder / "clip.json").read_text(encoding="utf-8"))
     masks = MaskTruth(folder / "gt" / "visible.txt", told["height"], told["width"])
-    return Clip(name, "composites", folder / "video.mp4", 1, range(1, told["frames"] + 1), masks, boxes)
+    changes = tuple(changes_of(told.get("illumination") or []))
+    return Clip(name, "composites", folder / "video.mp4", 1, range(1, told["frames"] + 1), masks, boxes, changes)
+
+
+def changes_of(gains: Sequence[float]) -> Iterable[Change]:
+    """Yield the changes of light that the gain of every frame tells."""
+    level, k = 0, 0
+    while k < len(gains):
+        if abs(gains[k] - gains[level]) <= SMALL:
+            k += 1
+            continue
+        sign, turn = np.sign(gains[k] - gains[level]), k
+        while turn + 1 < len(gains) and sign * (gains[turn + 1] - gains[turn]) > 0:
+            turn += 1
+        end = next(j for j in range(k, turn + 1) if abs(gains[j] - gains[turn]) <= SMALL)
+        yield Change(k, end, gains[turn] / gains[level])
+        level, k = turn, turn + 1
 
 
 def _open_cdnet(folder: Path) -> Clip:
@@ -453,6 +490,35 @@ class Times(NamedTuple):
     regions: float  # with the stage that makes regions
 
 
+class Lit(NamedTuple):
+    """False pixels a frame, before and after a change of light."""
+
+    before: float
+    after: float
+
+
+class FalsePixels:
+    """The false pixels of every frame of a clip, in its regions, outside of the truth boxes: not those of outlines."""
+
+    def __init__(self) -> None:
+        self.counts: dict[int, int] = {}
+
+    def __call__(self, frame: Frame, look: Look, labels: Labels | None, sought: Sought | None) -> None:
+        if labels is None or sought is None:
+            return
+        false = union(look.regions, *labels.moving.shape) & ~labels.moving
+        for x1, y1, x2, y2 in grown(sought.counted).round().astype(int).clip(0).tolist():
+            false[y1:y2, x1:x2] = False
+        self.counts[frame.index] = int(np.count_nonzero(false))
+
+    def around(self, change: Change, fps: float) -> Lit | None:
+        """Return their mean before and after a change, None if fewer than LEAST scored frames show one of them."""
+        long, wait = round(WINDOW * fps), round(AFTER * fps)
+        spans = range(change.begin - long, change.begin), range(change.end + wait, change.end + wait + long)
+        there = [[self.counts[index] for index in span if index in self.counts] for span in spans]
+        return Lit(*map(statistics.fmean, there)) if min(map(len, there)) >= LEAST else None
+
+
 @dataclass(frozen=True)
 class Result:
     """Everything that was measured, by clip and method."""
@@ -461,6 +527,7 @@ class Result:
     groups: dict[str, list[str]]  # clips by group
     scores: dict[tuple[str, str], Scores]  # by clip and method
     times: dict[tuple[str, str], Times]  # by group and method
+    lights: dict[tuple[str, Change, str], Lit]  # by clip, change and method
 
     def pooled(self, group: str, method: str) -> Scores:
         return reduce(Scores.__add__, (self.scores[clip, method] for clip in self.groups[group]))
@@ -469,7 +536,7 @@ class Result:
 def run(data: Path, names: Sequence[str], methods: list[str], drawings: Path | None = None) -> Result:
     """Measure every method on every clip that is there."""
     groups: dict[str, list[str]] = {}
-    scores, times = {}, {}
+    scores, times, lights = {}, {}, {}
     for name in names:
         clip = open_clip(data, name)
         if clip is None:
@@ -480,17 +547,21 @@ def run(data: Path, names: Sequence[str], methods: list[str], drawings: Path | N
         groups.setdefault(clip.group, []).append(name)
         for method in methods:
             sheet = Sheet(clip) if drawings else None
-            scores[name, method] = measure(method, clip, sheet)
+            false = FalsePixels() if clip.changes else None
+            scores[name, method] = measure(method, clip, *(one for one in (sheet, false) if one))
+            for change in clip.changes if false else ():
+                if lit := false.around(change, open_source(clip.source).scene(None).fps):
+                    lights[name, change, method] = lit
             if sheet and drawings:
                 sheet.save(drawings / f"{name}-{method}.png")
             print(f"{name} {method} measured", file=sys.stderr)
     if not groups:
         raise ParameterError(f"there is no clip in {data}; name another place with --data")
-    return Result(methods, groups, scores, times)
+    return Result(methods, groups, scores, times, lights)
 
 
-def measure(method: str, clip: Clip, watch: Watch | None = None) -> Scores:
-    """Run one method over one clip and score it; `watch` sees every scored frame."""
+def measure(method: str, clip: Clip, *watches: Watch) -> Scores:
+    """Run one method over one clip and score it; `watches` see every scored frame."""
     source, total = open_source(clip.source), Scores()
     try:
         model = start(method, source)
@@ -499,7 +570,7 @@ def measure(method: str, clip: Clip, watch: Watch | None = None) -> Scores:
             if clip.scored(frame.index):
                 labels, sought = clip.truth(frame.index)
                 total += score(look, labels, sought)
-                if watch:
+                for watch in watches:
                     watch(frame, look, labels, sought)
     finally:
         source.close()
@@ -547,7 +618,7 @@ def tables_of(result: Result) -> list[Table]:
         tables += _pooled_tables(title, pooled)
         if len(clips) > 1:
             tables += [_clip_table(result, clips, what, key) for what, key in _EACH.items()]
-    return [*tables, _time_table(result)]
+    return [*tables, *([_light_table(result)] if result.lights else []), _time_table(result)]
 
 
 _EACH = {
@@ -591,6 +662,27 @@ def _clip_table(result: Result, clips: Sequence[str], what: str, key: str) -> Ta
         for clip in clips
     ]
     return Table(f"each clip: {what}", ["clip", *result.methods], rows)
+
+
+def _light_table(result: Result) -> Table:
+    """A row per change of light, a column per method."""
+    changes = dict.fromkeys((clip, change) for clip, change, _ in result.lights)
+    rows = [
+        [
+            clip,
+            f"{change.begin} to {change.end}: x {change.gain:.2f}",
+            *(
+                f"{lit.before:.0f} → {lit.after:.0f}"
+                for lit in (result.lights[clip, change, method] for method in result.methods)
+            ),
+        ]
+        for clip, change in changes
+    ]
+    return Table(
+        "false pixels a frame outside of the truth boxes, in the second before a change of light → in the third after it",
+        ["clip", "frames, gain", *result.methods],
+        rows,
+    )
 
 
 def _time_table(result: Result) -> Table:
@@ -679,6 +771,10 @@ def as_json(result: Result) -> dict[str, Any]:
             group: {method: _score_json(result.pooled(group, method)) for method in result.methods}
             for group in result.groups
         },
+        "lights": [
+            {"clip": clip, "begin": change.begin, "end": change.end, "method": method, **lit._asdict()}
+            for (clip, change, method), lit in result.lights.items()
+        ],
         "milliseconds": {
             group: {
                 name: {"foreground": own.foreground, "regions": own.regions}

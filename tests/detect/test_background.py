@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 from worlds import Block, World, lone_walker, walk
@@ -125,3 +126,23 @@ def test_a_frame_without_a_picture_is_refused_with_what_to_do():
 def test_few_frames_say_nothing_about_the_whole():
     detector = Background()
     assert detector.prepare(lone_walker().frames()[:2]) is detector
+
+
+def test_a_shaking_camera_makes_no_region_and_hides_nobody():
+    rng = np.random.default_rng(8)
+    wall = cv2.GaussianBlur(rng.normal(0, 120, (260, 340, 3)).astype(np.float32), (0, 0), 2) + 110
+    frames = []
+    for k in range(60):
+        image = wall.copy()
+        if k >= 10:
+            image[100:180, 40 + 3 * k : 80 + 3 * k] = (200, 40, 40)
+        dx, dy = 3 * np.sin(1.3 * k), 2 * np.sin(0.9 * k + 1)
+        image = cv2.warpAffine(image, np.float32([[1, 0, dx], [0, 1, dy]]), (340, 260))[10:250, 10:330]
+        noisy = image + rng.normal(0, 1.5, image.shape)
+        frames.append(Frame(k, k / 10, np.ascontiguousarray(noisy.clip(0, 255).astype(np.uint8))))
+    world = World((), width=320, height=240)
+    detector = Background().prepare(frames[::3])
+    for frame, regions in zip(frames, regions_of(world, detector, frames), strict=True):
+        assert len(regions) == (frame.index >= 10), frame.index
+    still = [len(regions) for regions in regions_of(world, Background(steady=False), frames)]
+    assert max(still) > 1
