@@ -376,7 +376,8 @@ def open_clip(data: Path, name: str) -> Clip | None:
         return Clip(name, name, folder / "video.avi", 1, range(1, boxes.last + 1), sought=boxes)
     told = json.loads((folder / "clip.json").read_text(encoding="utf-8"))
     masks = MaskTruth(folder / "gt" / "visible.txt", told["height"], told["width"])
-    changes = tuple(changes_of(told.get("illumination") or []))
+    gains = told.get("illumination")
+    changes = tuple(changes_of(gains)) if isinstance(gains, list) else ()
     return Clip(name, "composites", folder / "video.mp4", 1, range(1, told["frames"] + 1), masks, boxes, changes)
 
 
