@@ -73,12 +73,12 @@ class Smoothed(NamedTuple):
     """What most of each 5x5 neighbourhood says; 0 or 255."""
 
     seen: NDArray[np.uint8]  # (H, W) with what is doubtful where moving pixels enclose it
-    sure: NDArray[np.uint8]  # (H, W) without
+    sure: NDArray[np.uint8]  # (H, W) only where they do so on all four sides
 
 
 def smooth(foreground: NDArray[np.uint8]) -> Smoothed:
     """Keep what most of each 5x5 neighbourhood says; what is doubtful only where moving pixels enclose it."""
-    from perdure.maths.kernels.enclosed import enclosed
+    from perdure.maths.kernels.enclosed import PARTLY, enclosed
 
     seen, certain = np.zeros_like(foreground), np.zeros_like(foreground)
     moving = cv2.threshold(foreground, 254, 255, cv2.THRESH_BINARY)[1]
@@ -94,8 +94,8 @@ def smooth(foreground: NDArray[np.uint8]) -> Smoothed:
     some = _majority(cv2.threshold(foreground[rim], 0, 255, cv2.THRESH_BINARY)[1])
     doubtful = np.maximum(sure, some & 127)  # 0, 127, 255
     enclosed(doubtful, np.empty_like(doubtful))
-    seen[rim] = cv2.threshold(doubtful, 254, 255, cv2.THRESH_BINARY)[1]
-    certain[rim] = sure
+    seen[rim] = cv2.threshold(doubtful, PARTLY - 1, 255, cv2.THRESH_BINARY)[1]
+    certain[rim] = cv2.threshold(doubtful, PARTLY, 255, cv2.THRESH_BINARY)[1]
     return Smoothed(seen, certain)
 
 

@@ -9,11 +9,13 @@ from perdure.maths.kernels.compile import kernel
 
 LEFT, RIGHT, ABOVE, BELOW = 1, 2, 4, 8
 BESIDE = LEFT | RIGHT
+ALL_BUT_BELOW = BESIDE | ABOVE
+PARTLY = 254  # what is enclosed, but not on all four sides
 
 
 @kernel
 def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
-    """Turn doubtful pixels that sure ones enclose into sure ones, in place.
+    """Turn doubtful pixels that sure ones enclose into sure ones, in place: 255 if on all four sides, else PARTLY.
 
     From a doubtful pixel one goes left, right, up and down as long as pixels are doubtful; it is enclosed if a sure
     one ends the way down, and one the way up or both ways to the sides. What lies on the ground (a shadow) has
@@ -49,7 +51,8 @@ def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
                 ways = reach[y, x]
                 reach[y, x] = ways | BELOW
                 if (ways & ABOVE) or ways & BESIDE == BESIDE:
-                    seen[y, x] = 255  # has BELOW: for the row above it is as if it were still doubtful
+                    # It has BELOW: for the row above it is as if it were still doubtful.
+                    seen[y, x] = 255 if ways == ALL_BUT_BELOW else PARTLY
 
 
 def enclosed_twin(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
@@ -65,9 +68,9 @@ def enclosed_twin(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
     for y, x in np.argwhere(before == 127).tolist():
         left, right, above = (ends_sure(y, x, *way) for way in ((0, -1), (0, 1), (-1, 0)))
         if ends_sure(y, x, 1, 0) and (above or (left and right)):
-            seen[y, x] = 255
+            seen[y, x] = 255 if above and left and right else PARTLY
 
 
 @kernel
 def _meets(seen: NDArray[np.uint8], reach: NDArray[np.uint8], y: int, x: int, way: int) -> bool:
-    return bool(seen[y, x] == 255 or (seen[y, x] == 127 and (reach[y, x] & way) != 0))
+    return bool(seen[y, x] >= PARTLY or (seen[y, x] == 127 and (reach[y, x] & way) != 0))
