@@ -147,4 +147,4 @@ def test_what_is_taken_away_is_told():
     frames = film(lambda k: 1.0, count=40, who=lambda k: 60 if k < 25 else None)
     said = steps(frames)
     (event,) = events(said, "removed")
-    assert 25 <= event.begin <= 27
+    assert 27 <= event.begin <= 29

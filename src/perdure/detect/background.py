@@ -27,7 +27,7 @@ from perdure.detect.light import Light, busier, followed, is_sudden, relit
 from perdure.detect.marks import Ground, take_off_halo, take_out_shadows
 from perdure.detect.occluders import Occluder, Passages, no_passages, note, occluders
 from perdure.detect.steady import blank, moved, shift, steadied
-from perdure.detect.stillness import Stillness, is_first, no_stillness, rested, watch
+from perdure.detect.stillness import Stillness, is_gone, no_stillness, rested, watch
 from perdure.errors import ParameterError
 from perdure.params import parameter
 from perdure.types import Event, Frame, Image, Mask, Regions, Report, Scene, Status
@@ -232,6 +232,12 @@ class Background:
         take_off_halo(foreground, contrast)
         return foreground
 
+    def _is_told(self, state: BackgroundState, mask: Mask, time: float) -> bool:
+        """Whether a thing is told to be gone: for some while, not tiny, and not at the border, where things pass."""
+        (x1, y1, x2, y2), (height, width) = mask.box, state.held.shape
+        inside = x1 > 0 and y1 > 0 and x2 < width and y2 < height
+        return is_gone(state.still, mask, time) and inside and mask.area >= 2.0 * self.least_area * height * width
+
     def _with_early_look(self, state: BackgroundState, image: Image) -> BackgroundState:
         """Look over the first seconds as they go by: what stood in the first picture may have moved on.
 
@@ -302,7 +308,7 @@ class Background:
             known = state.mean[y1:y2, x1:x2]
             share = np.float32(1.0 if lies[number] else _share(seen.elapsed, _HEALED))
             known[mask.bits] += share * (lit[y1:y2, x1:x2][mask.bits] - known[mask.bits])
-            if lies[number] or is_first(state.still, mask, frame.time):
+            if lies[number] or self._is_told(state, mask, frame.time):
                 events.append(_noticed(mask, frame.index, "abandoned" if lies[number] else "removed"))
         return tuple(events)
 

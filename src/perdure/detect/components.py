@@ -143,8 +143,8 @@ _MAJORITY = 5  # pixels, the side of the neighbourhood that votes
 _PIECE = 0.5  # of the smallest region: what may be a piece of one
 _DETAIL = 8192  # pixels of a crop beyond which every second, third, … is enough
 _LEAST_THICKNESS = 2.0  # pixels from the middle to the border, below which nothing is a body
-_LIKE_THICKNESS = 0.6  # of the thicker body
-_LIKE_AREA = 0.5  # of the larger body
+_LIKE_THICKNESS = 0.5  # of the thicker body
+_LIKE_AREA = 0.35  # of the larger body
 
 
 def _majority(marks: NDArray[Any]) -> NDArray[np.uint8]:

@@ -116,7 +116,7 @@ def _filled(field: Single, known: Single) -> Single:
     return field
 
 
-_JUMP = math.log(1.12)  # of the brightness: a change of an eighth
+_JUMP = math.log(1.2)  # of the brightness: less is the camera's gain, all day long
 _FOLLOWED = 0.5  # s over which brightness and movement are averaged
 _MOST = 0.5  # of the picture: things do not come to cover more at once
 _SUDDEN = 0.35  # of the picture: how much more moves than did

@@ -21,14 +21,15 @@ class Stillness:
     cell: int  # pixels between two of them
     seen: NDArray[np.int16]  # (h, w, 3) grey levels last taken in
     since: NDArray[np.float64]  # (h, w) s, when that was, or when the place was last free
-    taken: NDArray[np.float64]  # (h, w) s, when a thing here was last found to be gone
+    gone: NDArray[np.float64]  # (h, w) s, since when a thing here is found to be gone; inf once that was told
+    lately: NDArray[np.float64]  # (h, w) s, when it was last found so
 
 
 def no_stillness(height: int, width: int) -> Stillness:
     """Return the state before the first frame of pictures of this size."""
     cell = max(1, round(min(height, width) / _GRID))
     shape = -(-height // cell), -(-width // cell)
-    return Stillness(cell, np.zeros((*shape, 3), np.int16), np.zeros(shape), np.full(shape, -np.inf))
+    return Stillness(cell, np.zeros((*shape, 3), np.int16), np.zeros(shape), *np.full((2, *shape), -np.inf))
 
 
 def watch(still: Stillness, regions: Regions, image: Image, time: float, tolerance: float) -> None:
@@ -71,13 +72,18 @@ def rested(still: Stillness, regions: Regions, time: float, least: float) -> Bit
     return found
 
 
-def is_first(still: Stillness, mask: Mask, time: float) -> bool:
-    """Return whether nothing has just been found to be gone here; from now on something has."""
+def is_gone(still: Stillness, mask: Mask, time: float) -> bool:
+    """Return whether a thing has been found to be gone from here for long enough to be told, and was not yet."""
     x1, y1, x2, y2 = mask.box
-    here = still.taken[y1 // still.cell : -(-y2 // still.cell), x1 // still.cell : -(-x2 // still.cell)]
-    fresh = bool((here < time - _SAME).all())
-    here.fill(time)
-    return fresh
+    part = np.s_[y1 // still.cell : -(-y2 // still.cell), x1 // still.cell : -(-x2 // still.cell)]
+    fresh = still.lately[part] < time - _SAME
+    still.gone[part][fresh] = time
+    still.lately[part] = time
+    since = float(still.gone[part].min(initial=np.inf))
+    if not since <= time - _LASTING:
+        return False
+    still.gone[part] = np.inf
+    return True
 
 
 def _on_grid(mask: Mask, cell: int) -> tuple[tuple[slice, slice], Bits]:
@@ -88,5 +94,6 @@ def _on_grid(mask: Mask, cell: int) -> tuple[tuple[slice, slice], Bits]:
 
 
 _SAME = 5.0  # s within which what is gone from one place is the same thing
+_LASTING = 0.25  # s for which it is gone before that is told
 _GRID = 288  # cells along the shorter side
 _ASLEEP = 0.9  # of a region's cells: a head that turns is more than the rest
