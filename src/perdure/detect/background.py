@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.detect.components import Stage, regions_of
-from perdure.detect.first_look import Early, FirstLook, exposed, exposure, has_colour, look_over
+from perdure.detect.first_look import Early, FirstLook, exposure, has_colour, look_over
 from perdure.detect.ghosts import ghosts
 from perdure.detect.light import Light, busier, followed, is_sudden, relit
 from perdure.detect.marks import Ground, take_off_halo, take_out_shadows
@@ -297,9 +297,8 @@ class Background:
 
     def _tend(self, state: BackgroundState, found: Regions, seen: _Seen, frame: Frame) -> tuple[Event, ...]:
         """Take in the places of things that are gone, within a second, and things that were left and lie still."""
-        lit = exposed(seen.image, seen.factor) if (seen.factor != 1.0).any() else seen.image
         gone = ghosts(found, seen.image, state.mean)
-        watch(state.still, found, lit, frame.time, self.threshold * self.least_noise)
+        watch(state.still, found, seen.image, seen.factor, frame.time, self.threshold * self.least_noise)
         lies = rested(state.still, found, frame.time, self.absorb) & ~gone
         events = []
         for number in np.flatnonzero(gone | lies):
@@ -307,7 +306,7 @@ class Background:
             x1, y1, x2, y2 = mask.box
             known = state.mean[y1:y2, x1:x2]
             share = np.float32(1.0 if lies[number] else _share(seen.elapsed, _HEALED))
-            known[mask.bits] += share * (lit[y1:y2, x1:x2][mask.bits] - known[mask.bits])
+            known[mask.bits] += share * (seen.image[y1:y2, x1:x2][mask.bits] * seen.factor - known[mask.bits])
             if lies[number] or self._is_told(state, mask, frame.time):
                 events.append(_noticed(mask, frame.index, "abandoned" if lies[number] else "removed"))
         return tuple(events)

@@ -32,7 +32,9 @@ def no_stillness(height: int, width: int) -> Stillness:
     return Stillness(cell, np.zeros((*shape, 3), np.int16), np.zeros(shape), *np.full((2, *shape), -np.inf))
 
 
-def watch(still: Stillness, regions: Regions, image: Image, time: float, tolerance: float) -> None:
+def watch(
+    still: Stillness, regions: Regions, image: Image, exposure: NDArray[np.float32], time: float, tolerance: float
+) -> None:
     """Take in a frame; in place.
 
     Parameters
@@ -42,7 +44,9 @@ def watch(still: Stillness, regions: Regions, image: Image, time: float, toleran
     regions : Regions
         With masks inside the picture.
     image : (H, W, 3) uint8
-        The picture; its exposure should be steady.
+        The picture.
+    exposure : (3,) float32
+        What each channel is multiplied by, so that a change of light is none of the thing's.
     time : float
         Of the frame, s.
     tolerance : float
@@ -54,7 +58,7 @@ def watch(still: Stillness, regions: Regions, image: Image, time: float, toleran
         if not bits.size:
             continue
         free[part] &= ~bits
-        now = image[:: still.cell, :: still.cell][part].astype(np.int16)
+        now = (image[:: still.cell, :: still.cell][part] * exposure).astype(np.int16)
         stirred = bits & (np.abs(now - still.seen[part]).max(axis=2, initial=0) > tolerance)
         still.seen[part][stirred] = now[stirred]
         still.since[part][stirred] = time

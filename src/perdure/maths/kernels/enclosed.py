@@ -29,16 +29,21 @@ def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
         Workspace.
     """
     height, width = seen.shape
+    doubtful = np.zeros(height, np.bool_)  # rows; most have nothing to decide
     for y in range(height):
-        open_left, open_right = False, False
+        open_left, open_right, some = False, False, False
         for x in range(width):
             value = seen[y, x]
             if value == 127:
+                some = True
                 reach[y, x] = (LEFT if open_left else 0) | (
                     ABOVE if y and _meets(seen, reach, y - 1, x, ABOVE) else 0
                 )
             else:
                 open_left = value == 255
+        doubtful[y] = some
+        if not some:
+            continue
         for x in range(width - 1, -1, -1):
             value = seen[y, x]
             if value == 127:
@@ -46,6 +51,8 @@ def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
             else:
                 open_right = value == 255
     for y in range(height - 1, -1, -1):
+        if not doubtful[y]:
+            continue
         for x in range(width):
             if seen[y, x] == 127 and y + 1 < height and _meets(seen, reach, y + 1, x, BELOW):
                 ways = reach[y, x]
