@@ -82,6 +82,24 @@ def test_another_picture_altogether_is_learnt_anew_within_half_a_second_and_said
     assert not any(len(step.regions) for step in said)
 
 
+@pytest.mark.parametrize("grey", [0, 128, 255])
+@pytest.mark.parametrize("long", [1, 15])
+@pytest.mark.parametrize("looked", [False, True])
+def test_an_empty_picture_blinds_and_the_room_is_known_when_it_is_back(grey, long, looked):
+    frames = film(lambda k: 1.0, count=80, who=lambda k: 2 * k if k > 2 else None)
+    empty = np.full((120, 160, 3), grey, np.uint8)
+    frames = [Frame(f.index, f.time, empty) if 30 <= f.index < 30 + long else f for f in frames]
+    said = steps(frames, Background().prepare(frames[::4]) if looked else None)
+    assert [k for k, step in enumerate(said) if step.regions.blind] == list(range(30, 30 + long))
+    assert [len(step.regions) for step in said[30 + long : 66]] == [1] * (36 - long)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25])
+def test_somebody_is_still_seen_in_the_dark_and_after_it(share):
+    said = steps(film(lambda k: share if 30 <= k < 45 else 1.0, who=lambda k: 2 * k if k > 2 else None))
+    assert all(len(step.regions) == 1 for step in said[50:])
+
+
 def test_patience_does_not_run_out_while_nothing_can_be_seen():
     tracker, state = Overlap(patience=0.3), None
     state = tracker.start(SCENE)

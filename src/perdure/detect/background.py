@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from perdure.detect.components import Stage, regions_of
 from perdure.detect.first_look import Early, FirstLook, exposure, has_colour, look_over
 from perdure.detect.ghosts import ghosts
-from perdure.detect.light import Light, busier, followed, is_sudden, relit
+from perdure.detect.light import Light, busier, followed, is_empty, is_sudden, relit, texture
 from perdure.detect.marks import Ground, take_off_halo, take_out_shadows
 from perdure.detect.occluders import Occluder, Passages, no_passages, note, occluders
 from perdure.detect.steady import blank, moved, shift, steadied
@@ -72,7 +72,7 @@ class Background:
     )
     darkest_shadow: float = parameter(
         0.4,
-        "what is evenly darker than the background and of its colour, but no darker than this share, is shadow; 1: none",
+        "down to this share of its brightness the ground is taken for shadow where it keeps colour and texture; 1: never",
         unit="of its brightness",
         low=0.0,
         high=1.0,
@@ -98,7 +98,7 @@ class Background:
         low=0.0,
         high=1.0,
     )
-    steady: bool = parameter(True, "whether a shaking camera is held still")
+    steady: bool = parameter(True, "whether a camera that shakes, by up to 1.5 % of the height, is held still")
     first_look: FirstLook | None = field(default=None, repr=False, compare=False)
 
     needs_pixels = True
@@ -199,6 +199,8 @@ class Background:
         state = dataclasses.replace(state, light=light, age=state.age + elapsed, time=frame.time)
         seen = _Seen(image, factor, place, foreground, elapsed, events if state.age > _SETTLED else ())
         busy = _moving(foreground)
+        if state.age > _SETTLED and is_empty(image, state.mean):
+            return self._blinded(state, seen, frame, busy, _COVERED)
         if light.blind >= 0 or (state.age > _SETTLED and is_sudden(light, busy, jumped=bool(events))):
             return self._in_new_light(state, seen, frame, busy)
         state = dataclasses.replace(state, light=busier(light, busy, elapsed))
@@ -263,29 +265,39 @@ class Background:
         sees = dataclasses.replace(light, blind=-1)
         if begun >= 0 and not is_sudden(light, busy):
             return dataclasses.replace(state, light=sees), self._told(
-                seen, begun, frame, "a flash, and it is over"
+                seen, begun, frame, "sight is back, and the picture as it was"
             )
         mean = relit(seen.image, seen.factor, state.mean, state.held)
         trial = dataclasses.replace(state, mean=mean, variance=state.variance.copy())
         foreground = self._compare_and_learn(trial, seen.image, seen.factor, seen.elapsed)
-        if not is_sudden(light, _moving(foreground)) and _moving(foreground) < busy / 2:
+        shows = texture(seen.image, seen.factor, mean)
+        if not is_sudden(light, _moving(foreground)) and _moving(foreground) < busy / 2 and shows > _SHOWN:
             why = f"{busy:.0%} of the picture changed at once; the model was brought to the new light"
             seen = self._told(seen._replace(foreground=foreground), begun, frame, why)
             early = state.early if state.early.is_over else Early.none_yet(*state.held.shape)
             return dataclasses.replace(trial, light=sees, early=early), seen
         if not is_sudden(light, busy):
             return dataclasses.replace(state, light=busier(light, busy, seen.elapsed)), seen
+        return self._blinded(state, seen, frame, busy, _WAIT)
+
+    def _blinded(
+        self, state: BackgroundState, seen: _Seen, frame: Frame, busy: float, wait: float
+    ) -> tuple[BackgroundState, _Seen]:
+        """Nothing explains the picture: wait so many seconds for one that something does, then learn it anew."""
+        light, begun = state.light, state.light.blind
         if begun < 0:
             light = dataclasses.replace(light, blind=frame.index, since=frame.time)
-            return dataclasses.replace(state, light=light), self._told(
-                seen, frame.index, frame, f"{busy:.0%} of the picture changed at once; blind until it settles"
-            )
-        if frame.time - light.since < _WAIT:
-            return dataclasses.replace(state, light=light), seen
+            why = f"{busy:.0%} of the picture changed at once; blind until it settles"
+            if wait == _COVERED:
+                why = "there is nothing in the picture; blind until there is"
+            return dataclasses.replace(state, light=light), self._told(seen, frame.index, frame, why)
+        if frame.time - light.since < wait:
+            return dataclasses.replace(state, light=light), seen._replace(events=())
+        mean = relit(seen.image, seen.factor, state.mean, state.held)
         fresh = np.where(state.held[..., None] != 0, mean, seen.image * seen.factor).astype(np.float32)
         noise = np.full(fresh.shape[:2], self.least_noise**2, np.float32)
-        early = Early.none_yet(*state.held.shape)
-        state = dataclasses.replace(state, mean=fresh, variance=noise, early=early, light=sees, age=0.0)
+        early, light = Early.none_yet(*state.held.shape), dataclasses.replace(light, blind=-1)
+        state = dataclasses.replace(state, mean=fresh, variance=noise, early=early, light=light, age=0.0)
         foreground = self._compare_and_learn(state, seen.image, seen.factor, seen.elapsed)
         seen = seen._replace(foreground=foreground)
         return state, self._told(seen, begun, frame, "the picture has settled; the model is learnt anew")
@@ -360,6 +372,8 @@ _LEAST_LOOKS = 5  # fewer pictures than this say nothing about the whole
 _FAINT = 0.8  # of the ground's brightness: so faint a shadow need not be even
 _HOLE = 0.05  # of a region's area: smaller holes in it are filled
 _SETTLED = 1.0  # s of learning before a jump of the light is one
+_SHOWN = 0.3  # of the model's texture must be in a picture that another light explains
 _WAIT = 0.2  # s for which a picture that no light explains may last before it is learnt anew
+_COVERED = 60.0  # s, the same for one in which there is nothing at all
 _SEEN = (Status.VISIBLE, Status.PARTLY_OCCLUDED, Status.AMBIGUOUS)
 _HEALED = 0.4  # s over which a ghost is taken in

@@ -103,11 +103,12 @@ def exposure(image: Image, mean: Single) -> Single:
     """Return the factor per channel (3,) that brings a picture to the model's exposure.
 
     The median of mean / image over a coarse grid: right as long as less than half of it is foreground.
-    Within one percent it is 1, so that a still scene stays untouched.
+    Within one percent it is 1, so that a still scene stays untouched; beyond a factor of MOST no light explains it.
     """
     step = max(1, min(image.shape[:2]) // _GRID)
     seen = image[::step, ::step].astype(np.float32)
     factors = np.median(np.maximum(mean[::step, ::step], 1.0) / np.maximum(seen, 1.0), axis=(0, 1))
+    factors = np.clip(factors, 1.0 / MOST, MOST)
     return np.where(np.abs(factors - 1.0) < 0.01, 1.0, factors).astype(np.float32)
 
 
@@ -118,6 +119,7 @@ def has_colour(image: Image) -> bool:
     return bool((np.ptp(seen, axis=2) > _GREY).any())
 
 
+MOST = 5.0  # times brighter or darker
 _GREY = 4  # grey levels that the channels of a colourless picture may differ by
 _STRIP = 32  # rows
 _GRID = 32  # rows of the grid on which the exposure is measured

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from perdure.detect.first_look import MOST
 from perdure.types import Event, Image
 
 Single = NDArray[np.float32]
@@ -24,7 +25,7 @@ Single = NDArray[np.float32]
 class Light:
     """How bright the picture is beside the model, and how much of it moves."""
 
-    level: float = 0.0  # logarithm of the brightness, picture / model, running mean
+    level: float = math.inf  # logarithm of the brightness, picture / model, running mean; infinite before the first
     busy: float = 0.0  # share of the picture that moves, running mean
     told: float = -math.inf  # s, when a change was last told
     blind: int = -1  # frame from which on nothing can be seen; -1: all is well
@@ -46,6 +47,8 @@ def followed(
         This frame, its time and that since the one before, s.
     """
     level = -float(np.log(factor).mean())
+    if not math.isfinite(light.level):
+        return dataclasses.replace(light, level=level), ()
     jump = level - light.level
     if abs(jump) < _JUMP:
         share = 1.0 - math.exp(-elapsed / _FOLLOWED)
@@ -68,6 +71,37 @@ def busier(light: Light, busy: float, elapsed: float) -> Light:
     """Follow the share of the picture that moves."""
     share = 1.0 - math.exp(-elapsed / _FOLLOWED)
     return dataclasses.replace(light, busy=light.busy + share * (busy - light.busy))
+
+
+def is_empty(image: Image, mean: Single) -> bool:
+    """Return whether a picture has nothing in it, all of one brightness, where the model has."""
+    step = max(1, min(mean.shape[:2]) // _SAMPLED)
+    return bool(np.ptp(image[::step, ::step]) < _FLAT and np.ptp(mean[::step, ::step]) > 2 * _FLAT)
+
+
+def texture(image: Image, exposure: Single, mean: Single) -> float:
+    """Return how much of the model's texture a picture shows, at most about 1; 0 where nothing of it is left.
+
+    The least squares factor between their slopes: a light dims the texture as it dims the ground, and a relit model
+    allows for that; fog, glare, a hand before the lens or black take it away.
+
+    Parameters
+    ----------
+    image : (H, W, 3) uint8
+        The picture.
+    exposure : (3,) float32
+        What each channel is multiplied by first.
+    mean : (H, W, 3) float32
+        The model's, in the light of the picture.
+    """
+    step = max(1, min(mean.shape[:2]) // _SAMPLED)
+    seen, known = image[::step, ::step, 1] * exposure[1], mean[::step, ::step, 1]
+    both = length = 0.0
+    for axis in (0, 1):
+        slope = np.diff(known, axis=axis)
+        both += float(np.vdot(slope, np.diff(seen, axis=axis)))
+        length += float(np.vdot(slope, slope))
+    return both / length if length > 0.0 else 0.0
 
 
 def relit(image: Image, exposure: Single, mean: Single, held: NDArray[np.uint8]) -> Single:
@@ -101,6 +135,7 @@ def relit(image: Image, exposure: Single, mean: Single, held: NDArray[np.uint8])
         field = np.where(known > 0, smooth, field)
     if known.any():
         field = _filled(field, known)
+    field = np.clip(field, 1.0 / MOST, MOST)  # beyond, it is no light: a cap on the lens, or the sun in it
     whole = cv2.resize(field, (width, height), interpolation=cv2.INTER_LINEAR)
     return np.asarray(mean * whole, np.float32)
 
@@ -116,6 +151,8 @@ def _filled(field: Single, known: Single) -> Single:
     return field
 
 
+_SAMPLED = 144  # rows at which pictures are compared
+_FLAT = 40  # grey levels between the darkest and the brightest pixel
 _JUMP = math.log(1.2)  # of the brightness: less is the camera's gain, all day long
 _FOLLOWED = 0.5  # s over which brightness and movement are averaged
 _MOST = 0.5  # of the picture: things do not come to cover more at once

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -14,9 +15,10 @@ from perdure.types import Frame, Regions, Scene
 
 @dataclass(frozen=True, eq=False)
 class RecordedState:
-    """The region of interest; all else is in the record."""
+    """The region of interest and where one is; all else is in the record."""
 
     roi: np.ndarray[tuple[int, int], np.dtype[np.bool_]] | None
+    next: int = -1  # the frame after the last one; -1 before the first
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,13 @@ class Recorded:
         return RecordedState(scene.roi)
 
     def step(self, state: RecordedState, frame: Frame) -> tuple[RecordedState, Regions]:
-        """Return the recorded regions of one frame whose centre lies in the roi."""
+        """Return the recorded regions of one frame whose centre lies in the roi, and events of frames that were skipped."""
         regions = self.regions.get(frame.index, Regions.empty())
+        between = range(state.next if state.next >= 0 else frame.index, frame.index)
+        skipped = [event for index in between if index in self.regions for event in self.regions[index].events]
+        if skipped:
+            regions = dataclasses.replace(regions, events=(*skipped, *regions.events))
+        state = dataclasses.replace(state, next=frame.index + 1)
         kept = regions.scores >= self.least_score
         if state.roi is not None and len(regions):
             height, width = state.roi.shape

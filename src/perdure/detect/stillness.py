@@ -81,8 +81,11 @@ def is_gone(still: Stillness, mask: Mask, time: float) -> bool:
     x1, y1, x2, y2 = mask.box
     part = np.s_[y1 // still.cell : -(-y2 // still.cell), x1 // still.cell : -(-x2 // still.cell)]
     fresh = still.lately[part] < time - _SAME
+    told = bool((still.gone[part][~fresh] == np.inf).any())
     still.gone[part][fresh] = time
     still.lately[part] = time
+    if told:  # another piece of it
+        still.gone[part] = np.inf
     since = float(still.gone[part].min(initial=np.inf))
     if not since <= time - _LASTING:
         return False

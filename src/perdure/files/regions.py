@@ -158,18 +158,22 @@ def _of_line(value: Mapping[str, Any]) -> Regions:
         classes,
         [Mask.empty() if one is None else mask_of_json(one) for one in masks],
     )
-    return dataclasses.replace(regions, events=_events(value.get("events", [])), blind=blind)
+    return dataclasses.replace(regions, events=_events(value.get("events", []), value.get("frame")), blind=blind)
 
 
-def _events(said: Any) -> tuple[Event, ...]:
-    """The events of a line."""
+def _events(said: Any, frame: Any) -> tuple[Event, ...]:
+    """The events of a frame's line."""
     if not isinstance(said, list) or not all(isinstance(one, dict) and set(one) == set(_EVENT) for one in said):
         raise ValueError(f"events must be a list of {{{', '.join(_EVENT)}}}")
     for one in said:
         if not all(isinstance(one[name], str) for name in ("kind", "why")):
             raise ValueError("an event's kind and why must be texts")
-        if not all(type(one[name]) is int and 0 <= one[name] <= _LAST for name in ("begin", "end")):
-            raise ValueError(f"an event's begin and end must be frames, whole numbers from 0 on, up to {_LAST}")
+        if not one["kind"]:
+            raise ValueError("an event must be of a kind")
+        if not all(type(one[name]) is int for name in ("begin", "end")) or not 0 <= one["begin"] <= one["end"]:
+            raise ValueError("an event's begin and end must be frames, whole numbers from 0 on, in this order")
+        if type(frame) is int and one["end"] > frame:
+            raise ValueError(f"an event cannot end in frame {one['end']}, after the frame in which it is told")
     return tuple(Event(**one) for one in said)
 
 
