@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from worlds import crossing
 
+from perdure.detect import Recorded
 from perdure.errors import FormatError
 from perdure.files.regions import read_regions, write_regions
-from perdure.types import Frame, Regions
+from perdure.types import Event, Frame, Regions, Scene
 
 
 def test_regions_with_masks_scores_and_classes_read_back(tmp_path: Path):
@@ -19,6 +21,23 @@ def test_regions_with_masks_scores_and_classes_read_back(tmp_path: Path):
     write_regions(tmp_path / "r.jsonl", seen)
     again = read_regions(tmp_path / "r.jsonl")
     assert all(again[frame.index].equals(regions) for frame, regions in seen)
+
+
+def test_what_the_detector_noticed_reads_back_and_a_stride_loses_nothing_of_it(tmp_path: Path):
+    told = Event("light", 1, 2, why="x 0.5")
+    empty = Regions.empty()
+    seen = [
+        (Frame(k, k / 10), replace(empty, events=(told,) if k == 2 else (), blind=k in (1, 2))) for k in range(5)
+    ]
+    write_regions(tmp_path / "r.jsonl", seen)
+    again = read_regions(tmp_path / "r.jsonl")
+    assert all(again[frame.index].equals(regions) for frame, regions in seen)
+    detector, events = Recorded(regions=again), []
+    state = detector.start(Scene(64, 48))
+    for k in (0, 3):
+        state, regions = detector.step(state, Frame(k, k / 10))
+        events += regions.events
+    assert events == [told]
 
 
 def test_a_frame_that_is_not_there_has_no_regions(tmp_path: Path):
@@ -50,6 +69,10 @@ def test_a_broken_input_leaves_no_half_file(tmp_path: Path):
 
 def mask(size: str = "[2,2]", runs: str = "[0,4]", x: str = "0") -> str:
     return f'{{"frame":1,"boxes":[[0,0,2,2]],"masks":[{{"x":{x},"y":0,"size":{size},"runs":{runs}}}]}}'  # one silhouette
+
+
+def event(kind: str = '"light"', begin: object = 3, end: object = 3) -> str:
+    return f'{{"frame":3,"boxes":[],"events":[{{"kind":{kind},"begin":{begin},"end":{end},"why":""}}]}}'
 
 
 @pytest.mark.parametrize(
@@ -100,6 +123,15 @@ def mask(size: str = "[2,2]", runs: str = "[0,4]", x: str = "0") -> str:
         (mask(runs="4"), "runs"),
         (mask(x="1e300"), "mask"),
         (mask(x="null"), "mask"),
+        ('{"frame":3,"boxes":[],"blind":3}', "blind"),
+        ('{"frame":3,"boxes":[],"events":{}}', "events"),
+        ('{"frame":3,"boxes":[],"events":[{"kind":"light"}]}', "events"),
+        (event(begin=-1), "begin and end"),
+        (event(begin=3, end=2), "in this order"),
+        (event(begin=3, end=9), "frame 9"),
+        (event(begin="true"), "begin and end"),
+        (event(kind='""'), "kind"),
+        (event(kind="1"), "texts"),
     ],
 )
 def test_a_line_that_holds_no_regions_is_named(tmp_path: Path, line: str, said: str):
