@@ -25,7 +25,7 @@ Single = NDArray[np.float32]
 class Light:
     """How bright the picture is beside the model, and how much of it moves."""
 
-    level: float = math.inf  # logarithm of the brightness, picture / model, running mean; infinite before the first
+    level: float = math.inf  # log of the brightness, picture / model, running mean; infinite at first
     busy: float = 0.0  # share of the picture that moves, running mean
     told: float = -math.inf  # s, when a change was last told
     blind: int = -1  # frame from which on nothing can be seen; -1: all is well
