@@ -7,8 +7,8 @@
 Methods: every detector of `perdure.detect` that needs pixels, as `perdure track` runs it on a file, its first
 look over all of it included, and as NAME-cold without that look, as on a live source; MOG2, KNN, GSOC, LSBP,
 CNT of cv2 at their defaults, each cold at the first frame, fed BGR, shadow pixels (127) counted as background.
-A peer's foreground becomes regions by the stage that ours uses: `clean` and `components` of
-`perdure.detect.components` with the parameters of `Background()`. GSOC and LSBP draw at random: their figures
+A peer's foreground becomes regions by the stage that ours uses: `regions_of` of
+`perdure.detect.components` with the parameters of `Background()`, without a model. GSOC and LSBP draw at random: their figures
 differ by up to .01 from run to run, all others are the same.
 
 Every frame of a clip is seen by every method. Scored are those with truth, from the 26th of the video on

@@ -11,7 +11,7 @@ from worlds import WORLDS, World, lone_walker, two_apart
 from perdure import params, states
 from perdure.detect import DETECTORS
 from perdure.errors import ParameterError
-from perdure.types import Frame, Mask, Regions, Scene
+from perdure.types import Frame, Mask, Regions, Report, Scene, Tracks
 
 pytestmark = pytest.mark.parametrize("kind", DETECTORS.values(), ids=list(DETECTORS))
 every_world = pytest.mark.parametrize("world", [make() for make in WORLDS.values()], ids=list(WORLDS))
@@ -47,6 +47,29 @@ def test_a_run_resumed_from_a_saved_state_is_the_same_run(kind, world: World):
         state = states.load(states.save(state), state_kind)
         _, after = run(detector, frames[stop:], world.scene, state)
         assert same(whole, before + after), f"resumed at frame {stop}"
+
+
+def test_a_run_in_which_the_tracker_is_heeded_resumes_from_a_saved_state(kind):
+    world = two_apart()
+    detector, frames = detector_for(kind, world), world.frames()
+    if not hasattr(detector, "heed"):
+        pytest.skip("heeds no tracker")
+    state_kind = typing.get_type_hints(kind.start)["return"]
+
+    def heeded(stop: int) -> list[Regions]:
+        state, found = detector.start(world.scene), []
+        for frame in frames:
+            state, regions = detector.step(state, frame)
+            ids = np.arange(1, len(regions) + 1)
+            rows = Tracks.of(frames=frame.index, times=frame.time, ids=ids, boxes=regions.boxes)
+            state = detector.heed(state, Report(rows))
+            found.append(regions)
+            if frame.index == stop:
+                state = states.load(states.save(state), state_kind)
+        return found
+
+    assert same(heeded(-1), heeded(3))
+    assert same(heeded(-1), heeded(world.count // 2))
 
 
 def test_videos_woven_in_one_process_do_not_see_each_other(kind):
