@@ -191,3 +191,20 @@ def _is_tight(bits: NDArray[np.bool_]) -> bool:
     if not bits.size:
         return True
     return bool(bits[0].any() and bits[-1].any() and bits[:, 0].any() and bits[:, -1].any())
+
+
+def union(masks: Sequence[Mask]) -> Mask:
+    """Return the mask of all pixels that are in any of the masks.
+
+    >>> union([Mask(0, 0, np.ones((1, 1), bool)), Mask(0, 2, np.ones((1, 1), bool))]).bits.tolist()
+    [[True, False, True]]
+    """
+    known = [mask for mask in masks if mask.bits.size]
+    if len(known) < 2:
+        return known[0] if known else Mask.empty()
+    box = crops(known)
+    (x1, y1), (x2, y2) = box[:, :2].min(axis=0).tolist(), box[:, 2:].max(axis=0).tolist()
+    bits = np.zeros((y2 - y1, x2 - x1), np.bool_)
+    for mask in known:
+        bits[mask.y - y1 : mask.box[3] - y1, mask.x - x1 : mask.box[2] - x1] |= mask.bits
+    return Mask(y1, x1, bits)
