@@ -93,7 +93,7 @@ def test_an_id_is_never_reused(kind):
     """Four walk through one after the other, with long pauses: four ids."""
     from worlds import Block, walk
 
-    pause = 60
+    pause = 120  # longer than anybody is remembered
     world = World(
         tuple(Block(walk((5, 30), (3, 0), pause * n, pause * n + 20)) for n in range(4)), count=pause * 4
     )

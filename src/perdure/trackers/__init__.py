@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from perdure.trackers.compound import Compound, CompoundState
 from perdure.trackers.overlap import Overlap
 
-__all__ = ["TRACKERS", "Overlap"]
+__all__ = ["TRACKERS", "Compound", "CompoundState", "Overlap"]
 
-TRACKERS: dict[str, type[Any]] = {"overlap": Overlap}
+TRACKERS: dict[str, type[Any]] = {"compound": Compound, "overlap": Overlap}

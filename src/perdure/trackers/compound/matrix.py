@@ -1,0 +1,239 @@
+"""The ambiguity matrix: which regions may be which targets, and the knots of targets and regions that result (IV.B)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.features.boxes import areas, centres, intersections, sizes
+from perdure.types import Boxes
+
+Float = NDArray[np.float32]
+Index = NDArray[np.intp]
+
+
+class Thresholds(NamedTuple):
+    """What makes a correspondence."""
+
+    distance: float
+    size_ratio: float  # of areas
+    second_distance: float  # of regions of low score
+    sure: float  # score of a region that may be any target
+    least: float  # score of a region that is looked at a second time
+    share: float  # of a region in a target, or a target in a region, that makes one part of the other
+    gain: float  # in distance, that a union must bring
+    near: float  # distance that a union may have at most
+
+
+class Knot(NamedTuple):
+    """Targets and regions that belong together: a connected component of correspondences."""
+
+    rows: tuple[int, ...]
+    regions: tuple[int, ...]
+
+
+class Matched(NamedTuple):
+    """What the matrix says of a frame."""
+
+    pairs: Index  # (K, 2) row of the target, region: visible targets
+    knots: tuple[Knot, ...]  # ambiguous ones
+
+
+def distances(regions: Boxes, targets: Boxes) -> Float:
+    """Return the distance (R, T) of regions (R, 4) from targets (T, 4) (IV.B).
+
+    1 - intersection / union where they intersect, else 1 + distance of the centres / the larger side of both: in
+    [0, inf).
+    """
+    shared = intersections(regions, targets)
+    distance = np.zeros(shared.shape, np.float32)
+    touch = shared > 0
+    row, column = np.nonzero(touch)
+    both = shared[row, column]
+    union = areas(regions)[row] + areas(targets)[column] - both
+    distance[row, column] = 1 - np.divide(both, union, out=np.zeros_like(both), where=union > 0)
+    x, y = centres(regions).T[:, :, None] - centres(targets).T[:, None, :]  # (R, T) each
+    largest = np.maximum(
+        sizes(regions).max(axis=1, initial=1e-6)[:, None], sizes(targets).max(axis=1, initial=1e-6)
+    )
+    np.divide(np.sqrt(x * x + y * y), largest, out=distance, where=~touch)
+    np.add(distance, 1.0, out=distance, where=~touch)
+    return distance
+
+
+def touching_distances(regions: Boxes, targets: Boxes) -> Float:
+    """Return the distance (R, T) where boxes share something, in [0, 1), and inf elsewhere: most of a crowd."""
+    shared = intersections(regions, targets)
+    row, column = np.nonzero(shared)
+    both = shared[row, column]
+    distance = np.full(shared.shape, np.inf, np.float32)
+    distance[row, column] = 1 - both / (areas(regions)[row] + areas(targets)[column] - both)
+    return distance
+
+
+def correspond(distance: Float, regions: Boxes, targets: Boxes, limits: Thresholds) -> NDArray[np.bool_]:
+    """Return which entries (R, T) of the ambiguity matrix are correspondences: close, and of similar size.
+
+    The thresholds are large on purpose. A region that is one piece of a target, or a target that is one member of a
+    merged region, fails the test of size against the whole; `match` finds those by testing unions.
+    """
+    near = distance < limits.distance
+    row, column = np.nonzero(near)
+    one, other = areas(regions)[row], areas(targets)[column]
+    near[row, column] = np.maximum(one, other) <= limits.size_ratio * np.maximum(np.minimum(one, other), 1e-6)
+    return near
+
+
+def match(
+    regions: Boxes, scores: Float, targets: Boxes, whole: NDArray[np.bool_], cost: Float, limits: Thresholds
+) -> Matched:
+    """Find visible, ambiguous and lost targets.
+
+    Parameters
+    ----------
+    regions : (R, 4)
+        Boxes.
+    scores : (R,)
+        Regions of low score are looked at a second time, for targets that found nothing.
+    targets : (T, 4)
+        Predicted boxes.
+    whole : (T,) bool
+        Temporary targets that stand for several: no test of size.
+    cost : (T,)
+        Added to the distance of targets that should come second.
+    limits : Thresholds
+        What makes a correspondence.
+    """
+    measure = distances if limits.distance > 1 else touching_distances
+    distance = measure(regions, targets)  # (R, T)
+    sure, weak = scores >= limits.sure, (scores >= limits.least) & (scores < limits.sure)
+    allowed = correspond(distance, regions, targets, limits)
+    if whole.any():
+        allowed |= (distance < limits.distance) & whole
+    taken = _one_to_one(np.where(allowed & sure[:, None], distance + cost, np.inf), limits.distance + 1)
+    late = (distance < limits.second_distance) & allowed & weak[:, None]
+    late[:, taken[taken >= 0]] = False
+    if late.any():
+        second = _one_to_one(np.where(late, distance + cost, np.inf), limits.distance + 1)
+        taken = np.where(taken >= 0, taken, second)  # (R,) target of each region, -1 for none
+    edges = [
+        *_merges(regions, targets, taken, limits),
+        *_splits(regions, sure, targets, whole, taken, limits),
+    ]
+    return _knotted(taken, edges)
+
+
+def _one_to_one(cost: Float, limit: float) -> Index:
+    """The target of each region (R,), -1 for none: least sum, where a pair costs less than leaving both alone."""
+    taken = np.full(cost.shape[0], -1, np.intp)
+    allowed = np.isfinite(cost)
+    if not allowed.any():
+        return taken
+    by_row, by_column = allowed.sum(axis=1), allowed.sum(axis=0)
+    row, column = np.nonzero(allowed)
+    plain = (by_row[row] == 1) & (by_column[column] == 1)
+    taken[row[plain]] = column[plain]
+    hard_rows = np.unique(row[~plain])
+    if len(hard_rows):
+        from scipy.optimize import (
+            linear_sum_assignment,
+        )  # half a second to load; most scenes begin without a choice
+
+        hard_columns = np.unique(column[~plain])
+        part = np.where(np.isfinite(cost), cost, limit)[np.ix_(hard_rows, hard_columns)]
+        first, second = linear_sum_assignment(part)
+        kept = part[first, second] < limit
+        taken[hard_rows[first[kept]]] = hard_columns[second[kept]]
+    return taken
+
+
+def _merges(regions: Boxes, targets: Boxes, taken: Index, limits: Thresholds) -> list[tuple[int, int]]:
+    """Edges (target, region): targets left over that explain a region better together with its own."""
+    left = np.ones(len(targets), np.bool_)
+    left[taken[taken >= 0]] = False
+    free = np.flatnonzero(left)
+    if not len(free) or not len(regions):
+        return []
+    inside = intersections(regions, targets[free]) / np.maximum(areas(targets[free]), 1e-6)  # (R, F)
+    edges = []
+    for region in np.flatnonzero((inside >= limits.share).any(axis=1)):
+        members = [int(taken[region])] if taken[region] >= 0 else []
+        others = free[np.argsort(-inside[region], kind="stable")][: int((inside[region] >= limits.share).sum())]
+        for other in map(int, others):
+            if members and not _gains(regions[region], targets[members], targets[other], limits.gain, limits.near):
+                continue
+            members.append(other)
+        if len(members) > 1:
+            edges += [(member, int(region)) for member in members if member != taken[region]]
+    return edges
+
+
+def _splits(
+    regions: Boxes,
+    sure: NDArray[np.bool_],
+    targets: Boxes,
+    whole: NDArray[np.bool_],
+    taken: Index,
+    limits: Thresholds,
+) -> list[tuple[int, int]]:
+    """Edges (target, region): regions left over that fit a target better together with its own."""
+    free = np.flatnonzero((taken < 0) & sure)
+    if not len(free) or not len(targets):
+        return []
+    inside = intersections(regions[free], targets) / np.maximum(areas(regions[free]), 1e-6)[:, None]  # (F, T)
+    own = {int(target): region for region, target in enumerate(taken) if target >= 0}
+    edges = []
+    scattered: dict[int, list[int]] = {}
+    for place, region in enumerate(free):
+        target = int(np.argmax(inside[place]))
+        if inside[place, target] < limits.share:
+            continue
+        mine = own.get(target)
+        if mine is None:
+            if whole[target]:
+                edges.append((target, int(region)))
+            else:
+                scattered.setdefault(target, []).append(int(region))
+        elif whole[target] or _gains(
+            targets[target], regions[[mine]], regions[region], limits.gain / 4, limits.near
+        ):
+            edges.append((target, int(region)))
+    for target, parts in scattered.items():
+        union = np.concatenate([regions[parts, :2].min(axis=0), regions[parts, 2:].max(axis=0)])[None]
+        apart = distances(union, targets[[target]])
+        if len(parts) > 1 and correspond(apart, union, targets[[target]], limits).all():
+            edges += [(target, part) for part in parts]
+    return edges
+
+
+def _gains(whole: Float, parts: Boxes, other: Float, gain: float, least: float) -> bool:
+    """Whether parts and another together are nearer to the whole than the parts alone, by `gain`."""
+    alone = np.concatenate([parts[:, :2].min(axis=0), parts[:, 2:].max(axis=0)])
+    union = np.concatenate([np.minimum(alone[:2], other[:2]), np.maximum(alone[2:], other[2:])])
+    near, far = distances(whole[None], np.stack([union, alone]).astype(np.float32))[0]
+    return bool(near < far - gain and near < least)
+
+
+def _knotted(taken: Index, edges: list[tuple[int, int]]) -> Matched:
+    """Connected components of the pairs and edges."""
+    pairs = np.stack([taken, np.arange(len(taken))], axis=1)[taken >= 0]
+    knots: list[Knot] = []
+    if edges:
+        group: dict[tuple[str, int], set[tuple[str, int]]] = {}
+        mine = {int(target): int(region) for target, region in pairs}
+        links = list(edges)
+        links += [(target, mine[target]) for target, _ in edges if target in mine]
+        links += [(int(taken[region]), region) for _, region in edges if taken[region] >= 0]
+        for target, region in links:
+            one, other = ("t", target), ("r", region)
+            union = group.get(one, {one}) | group.get(other, {other})
+            for node in union:
+                group[node] = union
+        for part in {id(one): one for one in group.values()}.values():
+            rows = sorted(number for kind, number in part if kind == "t")
+            knots.append(Knot(tuple(rows), tuple(sorted(number for kind, number in part if kind == "r"))))
+    in_knots = {row for knot in knots for row in knot.rows}
+    pairs = pairs[[int(target) not in in_knots for target in pairs[:, 0]]] if in_knots else pairs
+    return Matched(pairs, tuple(sorted(knots)))

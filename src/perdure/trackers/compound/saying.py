@@ -1,0 +1,193 @@
+"""What is said of a frame: rows, names for those that have earned one, and what has happened to whom."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.features.boxes import hull
+from perdure.features.masks import disjoint, holding, union
+from perdure.trackers.compound.gathering import HIDDEN, Held
+from perdure.trackers.compound.meetings import company
+from perdure.trackers.compound.targets import Targets, side_words
+from perdure.types import Boxes, Event, Frame, Mask, Regions, Status, Tracks
+
+Index = NDArray[np.intp]
+_SEEN = 0.35  # share of its form, from which a member of a compound is said to be seen
+_UNSEEN = 0.45  # confidence, at most, of one that is not
+_TOLD = 0.3  # s for which somebody must be hidden before it is told
+
+
+class Moment(NamedTuple):
+    """What is to be said of."""
+
+    frame: Frame
+    regions: Regions
+    region: Index  # (N,) of each target; -1 for none
+    held: Held
+    expected: Boxes  # (N, 4) where each should be
+    size: tuple[int, int]  # height, width of the picture
+
+
+class Said(NamedTuple):
+    """What was said, and the targets that now have names."""
+
+    targets: Targets
+    next_id: int
+    unsaid: Tracks  # rows of targets without a name; their ids are the targets' keys
+    rows: Tracks
+    events: tuple[Event, ...]
+
+
+def say(targets: Targets, next_id: int, unsaid: Tracks, moment: Moment, confirm: float, patience: float) -> Said:
+    """Name who has been seen for `confirm` seconds and every group; say the rows of all that have a name."""
+    group = is_group(targets)
+    targets, named = _named(targets, next_id, group, moment, confirm)
+    spoken, rows = _rows(targets, group, moment, patience)
+    said, late = rows, Tracks.empty()
+    events: list[Event] = []
+    if named.any():
+        late = unsaid.take(np.isin(unsaid.ids, targets.keys[named]))
+        order = np.argsort(targets.keys)
+        late = late.replace(ids=targets.ids[order][np.searchsorted(targets.keys[order], late.ids)])
+        unsaid = unsaid.take(~np.isin(unsaid.ids, targets.keys[named]))
+        things = np.flatnonzero(named & ~targets.temporary).tolist()
+        begins = zip(targets.first[things].tolist(), targets.ids[things].tolist(), strict=True)
+        events = [Event("entered", begin, begin, (one,)) for begin, one in begins]
+    mute = rows.ids == 0
+    if mute.any() or len(unsaid):
+        unsaid = unsaid.take(np.isin(unsaid.ids, targets.keys[targets.ids == 0]))
+        unsaid = Tracks.join([unsaid, rows.replace(ids=targets.keys[spoken]).take(mute)])
+        said = rows.take(~mute)
+    return Said(targets, next_id + int(named.sum()), unsaid, Tracks.join([late, said]), tuple(events))
+
+
+def is_group(targets: Targets) -> NDArray[np.bool_]:
+    """Return which targets (N,) are temporary ones that hold several."""
+    if not targets.temporary.any():
+        return np.zeros(len(targets), np.bool_)
+    keys, counts = np.unique(targets.within[targets.within > 0], return_counts=True)
+    return np.asarray(targets.temporary & np.isin(targets.keys, keys[counts > 1]))
+
+
+def _named(
+    targets: Targets, next_id: int, group: NDArray[np.bool_], moment: Moment, confirm: float
+) -> tuple[Targets, NDArray[np.bool_]]:
+    """Give ids, in the order of the rows."""
+    lasted = moment.frame.time - targets.born >= confirm - 1e-9
+    named = (targets.ids == 0) & (moment.region >= 0) & np.where(targets.temporary, group, lasted)
+    if not named.any():
+        return targets, named
+    return targets.with_(named, ids=next_id + np.arange(int(named.sum()))), named
+
+
+def _spoken(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: float) -> Index:
+    """The rows of targets that are spoken of: all but temporary ones without a company, and those long unseen."""
+    lately = (moment.region >= 0) | (targets.missed <= patience + 1e-9)
+    return np.flatnonzero(lately & (~targets.temporary | group))
+
+
+def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: float) -> tuple[Index, Tracks]:
+    """The targets that are spoken of, and a row for each."""
+    rows = _spoken(targets, group, moment, patience)
+    region, regions, held = moment.region[rows], moment.regions, moment.held
+    seen, known = region >= 0, rows < len(held.region)
+    shared = (company(targets, moment.region)[rows] > 1) & seen
+    share = np.where(known, held.share[np.minimum(rows, len(held.share) - 1)] if len(held.share) else 0, 1)
+    boxes = np.where(seen[:, None], targets.boxes[rows], moment.expected[rows])
+    own = np.flatnonzero(seen & ~shared)
+    boxes[own] = _of_own(targets, rows[own], region[own], boxes[own], moment)
+    status = np.where(
+        seen, np.where(targets.hidden[rows] > 0, Status.PARTLY_OCCLUDED, Status.VISIBLE), Status.LOST
+    )
+    status = np.where(shared, np.where(share >= _SEEN, Status.AMBIGUOUS, Status.OCCLUDED), status)
+    hope = np.clip(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0, 1.0)
+    sure = np.where(seen, np.append(regions.scores, 0.0)[region], hope)
+    sure = np.where(shared, np.where(share >= _SEEN, share, np.minimum(share, _UNSEEN)), sure)
+    masks = _masks(rows, region, shared, group, moment)
+    names = dict(zip(targets.keys[group].tolist(), targets.ids[group].tolist(), strict=True))
+    return rows, Tracks.of(
+        frames=moment.frame.index,
+        times=moment.frame.time,
+        ids=targets.ids[rows],
+        boxes=holding(boxes.astype(np.float32), masks) if any(mask.bits.size for mask in masks) else boxes,
+        status=status,
+        confidence=sure,
+        classes=targets.classes[rows],
+        groups=[names.get(key, 0) for key in targets.within[rows].tolist()] if names else 0,
+        inferred=~seen | (shared & (share < HIDDEN)),
+        masks=masks,
+        hidden_side=side_words(targets.hidden[rows]) if targets.hidden.any() else "",
+        links=[
+            (one, *held.pieces.get(row, ())) if one >= 0 else ()
+            for row, one in zip(rows.tolist(), region.tolist(), strict=True)
+        ],
+    )
+
+
+def _of_own(targets: Targets, rows: Index, region: Index, boxes: Boxes, moment: Moment) -> Boxes:
+    """The boxes (K, 4) said of targets with a region of their own: between what is believed and what is seen.
+
+    A group is where its region is; of a partly hidden target the believed box stands.
+    """
+    seen = moment.regions.boxes[region]
+    for place, row in enumerate(rows.tolist()):
+        if row in moment.held.pieces:
+            seen[place] = hull(moment.regions.boxes[[int(region[place]), *moment.held.pieces[row]]])
+    weight = np.where(targets.temporary[rows], 1.0, np.where(targets.hidden[rows] > 0, 0.0, 0.5))[:, None]
+    return np.asarray(boxes + weight * (seen - boxes), np.float32)
+
+
+def _masks(
+    rows: Index, region: Index, shared: NDArray[np.bool_], group: NDArray[np.bool_], moment: Moment
+) -> tuple[Mask, ...]:
+    """The pixels seen of each: its regions', or its own part of a common one; none of a group."""
+    known = moment.regions.masks
+    if not any(mask.bits.size for mask in known):
+        return (Mask.empty(),) * len(rows)
+    found = []
+    for row, number, common, several in zip(
+        rows.tolist(), region.tolist(), shared.tolist(), group[rows].tolist(), strict=True
+    ):
+        if number < 0 or several:
+            found.append(Mask.empty())
+        elif common:
+            found.append(moment.held.masks.get(row, Mask.empty()))
+        else:
+            found.append(union([known[one] for one in (number, *moment.held.pieces.get(row, ()))]))
+    return disjoint(found, *moment.size)
+
+
+def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]:
+    """Return what has happened to single targets: partly occluded, hidden by others, suspended, found again."""
+    frame, region = moment.frame, moment.region
+    count = len(before)
+    same = np.flatnonzero(
+        (targets.keys[:count] == before.keys) & (targets.ids[:count] > 0) & ~targets.temporary[:count]
+    )
+    shared = company(targets, region) > 1
+    events = []
+    for row in same[_crossed(before.partly[same], targets.partly[same])].tolist():
+        side = side_words(targets.hidden[[row]])[0]
+        why = f"the {side} does not match, the opposite side does"
+        events.append(_event("partly_occluded", targets, row, float(targets.partly[row]), frame, why))
+    for row in same[_crossed(before.missed[same], targets.missed[same])].tolist():
+        kind = "occluded" if shared[row] else "suspended"
+        why = "hidden by the others in its region" if shared[row] else "no region where it should be"
+        events.append(_event(kind, targets, row, float(targets.missed[row]), frame, why))
+    back = (before.missed[same] >= _TOLD) & (targets.missed[same] == 0)
+    for row in same[back].tolist():
+        why = f"where its trajectory led, after {before.missed[row]:.1f} s"
+        events.append(Event("found_again", frame.index, frame.index, (int(targets.ids[row]),), why=why))
+    return events
+
+
+def _crossed(before: NDArray[np.float64], now: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where a time has just reached what is worth telling."""
+    return (before < _TOLD) & (now >= _TOLD) & np.isfinite(now)
+
+
+def _event(kind: str, targets: Targets, row: int, lasted: float, frame: Frame, why: str) -> Event:
+    return Event(kind, frame.index, frame.index, (int(targets.ids[row]),), why=f"{why}, for {lasted:.1f} s")

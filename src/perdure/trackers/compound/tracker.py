@@ -1,0 +1,236 @@
+"""The tracker of compound targets: predict, match, resolve, update, say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.features.appearance import look, signature
+from perdure.params import parameter
+from perdure.trackers.compound.bodies import Bodies
+from perdure.trackers.compound.companies import Pair, accompany
+from perdure.trackers.compound.gathering import HIDDEN, Held, Sight, gather
+from perdure.trackers.compound.identity import Judge
+from perdure.trackers.compound.matrix import Thresholds, match
+from perdure.trackers.compound.meetings import Compound as Record
+from perdure.trackers.compound.meetings import form, resolve
+from perdure.trackers.compound.recalling import leaving, recall
+from perdure.trackers.compound.saying import Moment, happenings, say
+from perdure.trackers.compound.targets import Float, Targets, motions, newborn, predicted
+from perdure.trackers.compound.updating import learn, looked, unclaimed, update
+from perdure.types import Boxes, Event, Frame, Mask, Regions, Renamed, Report, Scene, Tracks
+
+_UNNAMED = 0.2  # distance that a target without a name is put behind others
+_UNSEEN = 0.2  # the same of one not seen for `patience` seconds
+_PART = 0.5  # share of a region in a target, or a target in a region, that makes one part of the other
+
+
+@dataclass(frozen=True, eq=False)
+class CompoundState:
+    """All targets and compounds, and what has been learnt of the place."""
+
+    targets: Targets
+    unsaid: Tracks  # rows of targets without a name; their ids are the targets' keys
+    compounds: tuple[Record, ...]
+    pairs: tuple[Pair, ...]  # who is with whom
+    bodies: Bodies
+    next_key: int
+    next_id: int
+    time: float  # s, of the last frame
+    size: tuple[int, int]  # height, width of the picture
+
+
+@dataclass(frozen=True)
+class Compound:
+    """Compound targets: identities that survive meetings, on silhouettes or on boxes alone."""
+
+    max_distance: float = parameter(
+        0.85,
+        "distance (1 - IoU, or more where boxes are apart) below which a region may be a target",
+        low=0.0,
+        high=5.0,
+    )
+    max_size_ratio: float = parameter(
+        4.0, "ratio of areas up to which a region may be a target", low=1.0, high=100.0
+    )
+    sure_score: float = parameter(
+        0.6, "score from which a region may be any target; others get a second look", low=0.0, high=1.0
+    )
+    birth_score: float = parameter(0.7, "score from which a region may be a new target", low=0.0, high=1.0)
+    weak_score: float = parameter(0.1, "score from which a region gets a second look", low=0.0, high=1.0)
+    patience: float = parameter(
+        2.0, "how long a target that is not seen is looked for", unit="s", low=0.0, high=3600.0
+    )
+    recall: float = parameter(
+        6.0, "how long it may be found again by its looks (with pictures)", unit="s", low=0.0, high=3600.0
+    )
+    longest: float = parameter(
+        10.0, "how long a target may be hidden by others in one region", unit="s", low=0.0, high=3600.0
+    )
+    confirm: float = parameter(
+        0.25, "how long a target must have been seen before it is said", unit="s", low=0.0, high=60.0
+    )
+    inertia: float = parameter(0.6, "time over which the size is averaged", unit="s", low=0.0, high=60.0)
+    partial: float = parameter(
+        0.2, "mismatch of a side that signals a partial occlusion", unit="target sizes", low=0.0, high=1.0
+    )
+    apart: float = parameter(
+        0.3, "gap from which regions have moved away from each other", unit="widths", low=0.0, high=10.0
+    )
+    settle: float = parameter(
+        0.7, "how long regions are apart until that is believed without a gap", unit="s", low=0.0, high=60.0
+    )
+    colour: float = parameter(
+        16.0, "weight of colours against motion and order, log odds; 0 does not look at them", low=0.0, high=1000.0
+    )
+    likeness: float = parameter(
+        0.75, "similarity of colours from which a lost target is found again", low=0.0, high=1.0
+    )
+
+    needs_pixels = False
+
+    def start(self, scene: Scene) -> CompoundState:
+        """Return the state without a target."""
+        nobody = newborn(
+            Frame(0, 0.0), np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.str_), 1
+        )
+        return CompoundState(
+            nobody, Tracks.empty(), (), (), Bodies.unknown(), 1, 1, 0.0, (scene.height, scene.width)
+        )
+
+    def step(self, state: CompoundState, frame: Frame, regions: Regions) -> tuple[CompoundState, Report]:
+        """Predict, match, gather, form and resolve compounds, update, give birth, find again, say, retire."""
+        targets, time = state.targets, frame.time
+        motion = motions(targets)
+        expected = predicted(targets, motion, time, self.patience)
+        held = self._gathered(state, expected, frame, regions)
+        meeting = form(targets, state.compounds, state.next_key, held, motion, frame, regions)
+        judge = Judge(frame, regions, state.pairs, self.colour)
+        meeting = resolve(meeting, frame, regions, self.apart, self.settle, judge)
+        targets = update(
+            meeting.targets, meeting.region, held, expected, regions, time, state.size, self.partial, self.inertia
+        )
+        births = unclaimed(targets, meeting.region, held, regions, self.birth_score)
+        if len(births):
+            scores, classes = regions.scores[births], regions.classes[births]
+            targets = targets.join(newborn(frame, regions.boxes[births], scores, classes, meeting.next_key))
+        region = np.concatenate([meeting.region, births])
+        waited = 0.0 if regions.blind else time - state.time
+        targets = _waited(targets, region, held, waited)
+        bodies = state.bodies
+        if _are_silhouettes(regions):  # a detector's boxes hold whole bodies as they are
+            bodies = learn(bodies, targets, region, time - state.time, state.size, _BODIES)
+        targets, region, recalled, renamed = self._recalled(targets, region, held, frame, regions, state.size)
+        company = accompany(state.pairs, targets, region, frame, regions.blind)
+        where = np.concatenate([expected, targets.boxes[len(expected) :]])
+        moment = Moment(frame, regions, region, held, where, state.size)
+        said = say(targets, state.next_id, state.unsaid, moment, self.confirm, self.patience)
+        told = happenings(state.targets, said.targets, moment)
+        kept, gone = self._retired(said.targets, region, frame, state.size, regions.blind)
+        live = set(kept.compound.tolist())
+        compounds = tuple(one for one in meeting.compounds if one.key in live)
+        key = meeting.next_key + len(births)
+        state = CompoundState(
+            kept, said.unsaid, compounds, company.pairs, bodies, key, said.next_id, time, state.size
+        )
+        events = (*said.events, *company.events, *meeting.events, *recalled, *told, *gone)
+        return state, Report(said.rows, renamed=(*meeting.renamed, *renamed), events=events)
+
+    def finish(self, state: CompoundState) -> Report:
+        """Return what is left to say: nothing."""
+        return Report.empty()
+
+    def _gathered(self, state: CompoundState, expected: Boxes, frame: Frame, regions: Regions) -> Held:
+        """Who is in which region; hidden members of compounds are looked for too, where they would have come out."""
+        targets = state.targets
+        lately = np.where(targets.frozen, targets.missed > 0, targets.missed <= self.patience + 1e-9)
+        active = np.flatnonzero(lately)
+        unseen = np.minimum(targets.missed / max(self.patience, 1e-6), 1.0)
+        cost = np.where(targets.ids == 0, _UNNAMED, 0.0) + _UNSEEN * unseen
+        blobs = _are_silhouettes(regions)
+        limits = Thresholds(
+            self.max_distance,
+            self.max_size_ratio,
+            _SECOND,
+            self.sure_score,
+            self.weak_score,
+            _PART,
+            *(_BLOBS if blobs else _BOXES),
+        )
+        found = match(
+            regions.boxes,
+            regions.scores,
+            expected[active],
+            targets.temporary[active],
+            cost[active].astype(np.float32),
+            limits,
+        )
+        fresh = (targets.ids == 0) & (frame.time - targets.born < self.confirm)
+        near = self.apart if blobs else -1.0
+        sight = Sight(frame, regions, state.size, state.bodies, near, self.colour > 0)
+        return gather(targets, expected, active, found, fresh, sight)
+
+    def _recalled(
+        self,
+        targets: Targets,
+        region: NDArray[np.intp],
+        held: Held,
+        frame: Frame,
+        regions: Regions,
+        size: tuple[int, int],
+    ) -> tuple[Targets, NDArray[np.intp], tuple[Event, ...], tuple[Renamed, ...]]:
+        """Bring looks up to date and find lost targets again by them; nothing without a picture."""
+        image = frame.image
+        if image is None or not self.colour:
+            return targets, region, (), ()
+
+        def now(row: int) -> Float:
+            x1, y1, x2, y2 = map(float, held.boxes[row])
+            return signature(look(image, held.masks.get(row, Mask.empty()), (x1, y1, x2, y2)))
+
+        targets = looked(targets, region, image, regions)
+        found = recall(targets, region, motions(targets), frame, size, self.confirm, self.likeness, now)
+        return found.targets, found.region, found.events, found.renamed
+
+    def _retired(
+        self, targets: Targets, region: NDArray[np.intp], frame: Frame, size: tuple[int, int], blind: bool
+    ) -> tuple[Targets, list[Event]]:
+        """Let go of who was not seen for long (IV.D), and of unnamed ones at the first miss."""
+        remembered = self.recall if frame.image is not None and self.colour else self.patience
+        limit = np.where(targets.frozen, self.longest, max(remembered, self.patience)) + 1e-9
+        unnamed = ~targets.temporary & (targets.ids == 0)
+        kept = np.where(unnamed, ((region >= 0) | blind) & np.isfinite(targets.missed), targets.missed <= limit)
+        kept |= targets.temporary & blind & np.isfinite(targets.missed)
+        gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
+        out = leaving(targets, motions(targets), size) if len(gone) else kept
+        events = [
+            Event("left" if out[row] else "lost", frame.index, frame.index, (int(targets.ids[row]),))
+            for row in gone
+        ]
+        if not kept.all():
+            targets = targets.take(kept)
+        if not targets.compound.any():
+            return targets, events
+        orphans = targets.frozen & ~np.isin(targets.within, targets.keys[targets.temporary])
+        return targets.with_(orphans, compound=0, within=0) if orphans.any() else targets, events
+
+
+_SECOND = 0.5  # distance up to which a region of low score may be a target
+_BLOBS = (0.1, 2.0)  # gain and distance of unions that merge, where regions are silhouettes
+_BOXES = (0.35, 0.25)  # and where they are a detector's boxes, which seldom hold two
+_BODIES = 120.0  # s of observation after which the size of bodies is forgotten
+
+
+def _are_silhouettes(regions: Regions) -> bool:
+    """Whether the detector gives silhouettes, of which one may hold several bodies, or pieces of one."""
+    return any(mask.bits.size for mask in regions.masks)
+
+
+def _waited(targets: Targets, region: NDArray[np.intp], held: Held, waited: float) -> Targets:
+    """Targets with the time for which each was not seen; who shows too little of herself is not."""
+    known = np.arange(len(targets)) < len(held.share)
+    hidden = known & (np.append(held.share, 0.0)[np.minimum(np.arange(len(targets)), len(held.share))] < HIDDEN)
+    seen = (region >= 0) & (targets.temporary | ~hidden)
+    return replace(targets, missed=np.where(seen & np.isfinite(targets.missed), 0.0, targets.missed + waited))
