@@ -59,7 +59,7 @@ def test_a_run_folder_holds_run_log_tracks_events_and_a_film(place: Path):
     }  # fmt: skip
     about = json.loads((place / "first/run.json").read_text())
     assert (about["status"], about["frames"], about["tracks"]) == ("done", 40, 2)
-    assert about["tracker"]["parameters"]["patience"] == 1.0
+    assert about["tracker"]["parameters"]["patience"] == 2.0
 
 
 def test_the_two_walkers_are_found_where_they_are(place: Path):

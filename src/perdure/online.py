@@ -43,7 +43,7 @@ class Online:
 
     Examples
     --------
-    >>> tracker = Online("overlap", fps=10, confirm=0.0)
+    >>> tracker = Online(fps=10, confirm=0.0)
     >>> tracker.update([[10, 10, 30, 60]]).ids.tolist()
     [1]
     >>> tracker.update([[12, 10, 32, 60]]).ids.tolist()
@@ -51,7 +51,13 @@ class Online:
     """
 
     def __init__(
-        self, tracker: str = "overlap", *, fps: float = 25.0, width: int = 0, height: int = 0, **parameters: object
+        self,
+        tracker: str = "compound",
+        *,
+        fps: float = 25.0,
+        width: int = 0,
+        height: int = 0,
+        **parameters: object,
     ) -> None:
         if not isinstance(tracker, str) or tracker not in TRACKERS:
             raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))

@@ -96,7 +96,7 @@ class Plan:
 def plan(
     source: AnySource,
     *,
-    tracker: str = "overlap",
+    tracker: str = "compound",
     detector: str | Path | None = None,
     fps: float | None = None,
     start: str | float | None = None,

@@ -26,7 +26,7 @@ def demo(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="Where film, truth and run go.")
     ] = Path("perdure-runs/demo"),
-    tracker: Annotated[str, typer.Option(metavar="NAME", help="The tracker to show.")] = "overlap",
+    tracker: Annotated[str, typer.Option(metavar="NAME", help="The tracker to show.")] = "compound",
     json_: options.JsonOption = False,
 ) -> None:
     """Draw a short film with meetings, a group and an occluder; track it; score it against its own truth."""

@@ -40,7 +40,7 @@ def track(
             "-o", "--output", metavar="DIR", help="Run folder; default perdure-runs/NAME.", show_default=False
         ),
     ] = None,
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=f"One of: {', '.join(TRACKERS)}.")] = "overlap",
+    tracker: Annotated[str, typer.Option(metavar="NAME", help=f"One of: {', '.join(TRACKERS)}.")] = "compound",
     detector: options.DetectorOption = None,
     roi: options.RoiOption = None,
     class_: options.ClassOption = None,
