@@ -1,0 +1,45 @@
+"""Every paragraph and equation of a paper has its place: the tables of the pages name functions that are there."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAPERS = {
+    "compound-targets.md": [
+        "III.B, fig. 1",
+        "III.B",
+        "III.C",
+        "IV.A",
+        "IV.B, equation",
+        "IV.B",
+        "IV.C, fig. 2",
+        "IV.C",
+        "IV.D",
+    ]
+}
+
+
+def table(page: str) -> list[tuple[str, list[str]]]:
+    """Return (place in the paper, names in code) of each row of a page's first table."""
+    text = (DOCS / page).read_text(encoding="utf-8").split("\n## ")[0]
+    rows = [line.split("|")[1:-1] for line in text.splitlines() if line.startswith("| ") and "---" not in line]
+    return [(row[0].strip(), re.findall(r"`([\w.]+)`", row[2])) for row in rows[1:]]
+
+
+@pytest.mark.parametrize("page", PAPERS)
+def test_every_part_of_the_paper_is_in_the_list(page: str):
+    assert {place for place, _ in table(page)} == set(PAPERS[page])
+
+
+@pytest.mark.parametrize("page", PAPERS)
+def test_every_function_in_the_list_is_there_and_tells_its_place(page: str):
+    for place, names in table(page):
+        for name in names:
+            module, _, function = name.rpartition(".")
+            found = getattr(importlib.import_module(f"perdure.{module}"), function)
+            assert found.__doc__, f"{place}: {name} has no docstring"
