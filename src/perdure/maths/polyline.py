@@ -78,14 +78,10 @@ def motion(lines: Polylines, tolerance: ArrayLike, shortest: float, horizon: flo
     shortest, horizon : float
         Seconds, ≥ 0. Where the kept segments do not reach back to the horizon, all of them count.
     """
-    ages = lines.last[:, :1] - lines.knots[:, :, 0]  # (N, KNOTS), oldest first
-    far = np.argmin(np.where(ages >= horizon, ages, np.inf), axis=1)  # the latest of those old enough
-    far = np.where((ages >= horizon).any(axis=1), far, 0)
-    rows = np.arange(len(lines))
-    since = ages[rows, far][:, None]
-    moved = lines.last[:, 1:] - lines.knots[rows, far, 1:]
-    over = np.divide(moved, since, out=np.zeros((len(lines), 2)), where=since > 0)
-    return np.where(reliable(lines, tolerance, shortest)[:, None], velocity(lines), over)
+    from perdure.maths.kernels.paths import motion as kernel  # numba: half a second that no import should cost
+
+    limits = np.ascontiguousarray(np.broadcast_to(np.asarray(tolerance, np.float64), len(lines)))
+    return kernel(lines.knots, lines.last, lines.sums, limits, float(shortest), float(horizon))
 
 
 def extend(
@@ -108,23 +104,12 @@ def extend(
     longest : float
         Seconds after which a segment ends in any case, so that an old speed is forgotten.
     """
-    points = np.asarray(points, np.float64).reshape(-1, 2)
+    from perdure.maths.kernels.paths import extend as kernel  # numba: half a second that no import should cost
+
+    places = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 2))
+    limits = np.ascontiguousarray(np.broadcast_to(np.asarray(tolerance, np.float64), len(places)))
     knots, last, sums = lines.knots.copy(), lines.last.copy(), lines.sums.copy()
-    mine = lines.take(rows)
-    speed, begin = velocity(mine), mine.knots[:, -1]  # (K, 2), (K, 3)
-    elapsed = time - begin[:, 0]
-    off = np.hypot(*(points - begin[:, 1:] - speed * elapsed[:, None]).T)
-    ended = (mine.sums[:, _N] > 1) & ((off > tolerance) | (elapsed > longest))
-    over = rows[ended]
-    knots[over, :-1] = knots[over, 1:]
-    duration = (mine.last[:, 0] - begin[:, 0])[ended]
-    knots[over, -1, 0] = mine.last[ended, 0]
-    knots[over, -1, 1:] = begin[ended, 1:] + speed[ended] * duration[:, None]
-    sums[over] = 0.0
-    t = time - knots[rows, -1, 0]
-    x, y = (points - knots[rows, -1, 1:]).T
-    sums[rows] += np.stack([np.ones(len(rows)), t * t, t * x, t * y, x * x + y * y], axis=1)
-    last[rows, 0], last[rows, 1:] = time, points
+    kernel(knots, last, sums, np.asarray(rows, np.intp), float(time), places, limits, float(longest))
     return replace(lines, knots=knots, last=last, sums=sums)
 
 

@@ -63,27 +63,36 @@ def distances(regions: Boxes, targets: Boxes) -> Float:
     return distance
 
 
-def touching_distances(regions: Boxes, targets: Boxes) -> Float:
-    """Return the distance (R, T) where boxes share something, in [0, 1), and inf elsewhere: most of a crowd."""
+class Near(NamedTuple):
+    """Regions and targets that are close enough to correspond: K entries of the ambiguity matrix."""
+
+    region: Index  # (K,)
+    target: Index  # (K,)
+    distance: Float  # (K,)
+
+
+def near(regions: Boxes, targets: Boxes, farthest: float) -> Near:
+    """Return the entries of the matrix with distances below `farthest`; where boxes must touch, only those are looked at."""
+    if farthest > 1:
+        every = distances(regions, targets)
+        region, target = np.nonzero(every < farthest)
+        return Near(region, target, every[region, target])
     shared = intersections(regions, targets)
-    row, column = np.nonzero(shared)
-    both = shared[row, column]
-    distance = np.full(shared.shape, np.inf, np.float32)
-    distance[row, column] = 1 - both / (areas(regions)[row] + areas(targets)[column] - both)
-    return distance
+    region, target = np.nonzero(shared)
+    both = shared[region, target]
+    distance = 1 - both / (areas(regions)[region] + areas(targets)[target] - both)
+    kept = distance < farthest
+    return Near(region[kept], target[kept], distance[kept])
 
 
-def correspond(distance: Float, regions: Boxes, targets: Boxes, limits: Thresholds) -> NDArray[np.bool_]:
-    """Return which entries (R, T) of the ambiguity matrix are correspondences: close, and of similar size.
+def correspond(entries: Near, regions: Boxes, targets: Boxes, size_ratio: float) -> NDArray[np.bool_]:
+    """Return which entries (K,) of the ambiguity matrix are correspondences: close, and of similar size.
 
     The thresholds are large on purpose. A region that is one piece of a target, or a target that is one member of a
     merged region, fails the test of size against the whole; `match` finds those by testing unions.
     """
-    near = distance < limits.distance
-    row, column = np.nonzero(near)
-    one, other = areas(regions)[row], areas(targets)[column]
-    near[row, column] = np.maximum(one, other) <= limits.size_ratio * np.maximum(np.minimum(one, other), 1e-6)
-    return near
+    one, other = areas(regions)[entries.region], areas(targets)[entries.target]
+    return np.asarray(np.maximum(one, other) <= size_ratio * np.maximum(np.minimum(one, other), 1e-6))
 
 
 def match(
@@ -106,18 +115,15 @@ def match(
     limits : Thresholds
         What makes a correspondence.
     """
-    measure = distances if limits.distance > 1 else touching_distances
-    distance = measure(regions, targets)  # (R, T)
     sure, weak = scores >= limits.sure, (scores >= limits.least) & (scores < limits.sure)
-    allowed = correspond(distance, regions, targets, limits)
-    if whole.any():
-        allowed |= (distance < limits.distance) & whole
-    taken = _one_to_one(np.where(allowed & sure[:, None], distance + cost, np.inf), limits.distance + 1)
-    late = (distance < limits.second_distance) & allowed & weak[:, None]
-    late[:, taken[taken >= 0]] = False
-    if late.any():
-        second = _one_to_one(np.where(late, distance + cost, np.inf), limits.distance + 1)
-        taken = np.where(taken >= 0, taken, second)  # (R,) target of each region, -1 for none
+    entries = near(regions, targets, limits.distance)
+    allowed = correspond(entries, regions, targets, limits.size_ratio) | whole[entries.target]
+    worth = Near(entries.region, entries.target, entries.distance + cost[entries.target])
+    taken = np.full(len(regions), -1, np.intp)  # target of each region
+    _one_to_one(taken, worth, allowed & sure[entries.region], limits.distance + 1)
+    if weak.any():
+        late = allowed & weak[entries.region] & (entries.distance < limits.second_distance)
+        _one_to_one(taken, worth, late & ~np.isin(entries.target, taken[taken >= 0]), limits.distance + 1)
     edges = [
         *_merges(regions, targets, taken, limits),
         *_splits(regions, sure, targets, whole, taken, limits),
@@ -125,28 +131,24 @@ def match(
     return _knotted(taken, edges)
 
 
-def _one_to_one(cost: Float, limit: float) -> Index:
-    """The target of each region (R,), -1 for none: least sum, where a pair costs less than leaving both alone."""
-    taken = np.full(cost.shape[0], -1, np.intp)
-    allowed = np.isfinite(cost)
-    if not allowed.any():
-        return taken
-    by_row, by_column = allowed.sum(axis=1), allowed.sum(axis=0)
-    row, column = np.nonzero(allowed)
-    plain = (by_row[row] == 1) & (by_column[column] == 1)
-    taken[row[plain]] = column[plain]
-    hard_rows = np.unique(row[~plain])
-    if len(hard_rows):
-        from scipy.optimize import (
-            linear_sum_assignment,
-        )  # half a second to load; most scenes begin without a choice
+def _one_to_one(taken: Index, entries: Near, allowed: NDArray[np.bool_], limit: float) -> None:
+    """Note in `taken` the target of each region: least sum, where a pair costs less than leaving both alone."""
+    region, target = entries.region[allowed], entries.target[allowed]
+    if not len(region):
+        return
+    plain = (np.bincount(region)[region] == 1) & (np.bincount(target)[target] == 1)
+    taken[region[plain]] = target[plain]
+    if plain.all():
+        return
+    from scipy.optimize import linear_sum_assignment  # half a second to load; most scenes begin without a choice
 
-        hard_columns = np.unique(column[~plain])
-        part = np.where(np.isfinite(cost), cost, limit)[np.ix_(hard_rows, hard_columns)]
-        first, second = linear_sum_assignment(part)
-        kept = part[first, second] < limit
-        taken[hard_rows[first[kept]]] = hard_columns[second[kept]]
-    return taken
+    rows, row = np.unique(region[~plain], return_inverse=True)
+    columns, column = np.unique(target[~plain], return_inverse=True)
+    part = np.full((len(rows), len(columns)), limit)
+    part[row, column] = entries.distance[allowed][~plain]
+    first, second = linear_sum_assignment(part)
+    kept = part[first, second] < limit
+    taken[rows[first[kept]]] = columns[second[kept]]
 
 
 def _merges(regions: Boxes, targets: Boxes, taken: Index, limits: Thresholds) -> list[tuple[int, int]]:
@@ -202,8 +204,9 @@ def _splits(
             edges.append((target, int(region)))
     for target, parts in scattered.items():
         union = np.concatenate([regions[parts, :2].min(axis=0), regions[parts, 2:].max(axis=0)])[None]
-        apart = distances(union, targets[[target]])
-        if len(parts) > 1 and correspond(apart, union, targets[[target]], limits).all():
+        entry = near(union, targets[[target]], limits.distance)
+        whole_one = correspond(entry, union, targets[[target]], limits.size_ratio)
+        if len(parts) > 1 and len(whole_one) and whole_one.all():
             edges += [(target, part) for part in parts]
     return edges
 

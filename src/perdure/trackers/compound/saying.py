@@ -93,19 +93,23 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
     """The targets that are spoken of, and a row for each."""
     rows = _spoken(targets, group, moment, patience)
     region, regions, held = moment.region[rows], moment.regions, moment.held
-    seen, known = region >= 0, rows < len(held.region)
-    shared = (company(targets, moment.region)[rows] > 1) & seen
-    share = np.where(known, held.share[np.minimum(rows, len(held.share) - 1)] if len(held.share) else 0, 1)
+    seen = region >= 0
+    shared = company(targets, moment.region)[rows] > 1
     boxes = np.where(seen[:, None], targets.boxes[rows], moment.expected[rows])
     own = np.flatnonzero(seen & ~shared)
     boxes[own] = _of_own(targets, rows[own], region[own], boxes[own], moment)
-    status = np.where(
-        seen, np.where(targets.hidden[rows] > 0, Status.PARTLY_OCCLUDED, Status.VISIBLE), Status.LOST
-    )
-    status = np.where(shared, np.where(share >= _SEEN, Status.AMBIGUOUS, Status.OCCLUDED), status)
-    hope = np.clip(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0, 1.0)
-    sure = np.where(seen, np.append(regions.scores, 0.0)[region], hope)
-    sure = np.where(shared, np.where(share >= _SEEN, share, np.minimum(share, _UNSEEN)), sure)
+    status = np.where(seen, targets.hidden[rows] > 0, int(Status.LOST))  # VISIBLE 0, PARTLY_OCCLUDED 1
+    sure = np.append(regions.scores, 0.0)[region]
+    if not seen.all():
+        hope = np.clip(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0, 1.0)
+        sure = np.where(seen, sure, hope)
+    inferred = ~seen
+    if shared.any():
+        share = np.append(held.share, np.ones(len(targets) - len(held.share), np.float32))[rows]
+        clear = share >= _SEEN
+        status = np.where(shared, np.where(clear, int(Status.AMBIGUOUS), int(Status.OCCLUDED)), status)
+        sure = np.where(shared, np.where(clear, share, np.minimum(share, _UNSEEN)), sure)
+        inferred = inferred | (shared & (share < HIDDEN))
     masks = _masks(rows, region, shared, group, moment)
     names = dict(zip(targets.keys[group].tolist(), targets.ids[group].tolist(), strict=True))
     return rows, Tracks.of(
@@ -117,7 +121,7 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
         confidence=sure,
         classes=targets.classes[rows],
         groups=[names.get(key, 0) for key in targets.within[rows].tolist()] if names else 0,
-        inferred=~seen | (shared & (share < HIDDEN)),
+        inferred=inferred,
         masks=masks,
         hidden_side=side_words(targets.hidden[rows]) if targets.hidden.any() else "",
         links=[

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +18,6 @@ Index = NDArray[np.intp]
 CENTRE, TOP, BOTTOM, LEFT, RIGHT = range(5)
 OFFSETS = np.array([[0, 0], [0, -0.5], [0, 0.5], [-0.5, 0], [0.5, 0]], np.float32)  # of the points, in sizes
 SIDES = ("left", "top", "right", "bottom")
-_SIDE_POINTS = (LEFT, TOP, RIGHT, BOTTOM)
 TOLERANCE = 0.12  # target sizes that a location may lie off a segment
 _RELIABLE = 0.4  # s that a segment must have lasted
 _HORIZON = 0.5  # s that an unreliable trajectory looks back
@@ -150,37 +148,6 @@ def predicted(targets: Targets, motion: Float, time: float, patience: float) -> 
     reach = patience * -np.expm1(-elapsed / max(patience, 1e-6))
     centre = targets.lines.last[:, 1:] + motion * reach[:, None]
     return around(centre.astype(np.float32), targets.size)
-
-
-class Fit(NamedTuple):
-    """How K targets lie on their regions."""
-
-    points: Float  # (K, 5, 2) generic points now
-    good: NDArray[np.bool_]  # (K, 5) points that match
-    hidden: NDArray[np.int8]  # (K,) bits of hidden sides
-    expected: Float  # (K, 2) where the centres were
-
-
-def fit(expected: Boxes, boxes: Boxes, tolerance: float) -> Fit:
-    """Locate targets, expected at boxes (K, 4), by the points that match their regions' boxes (K, 4) best (III.B).
-
-    The paper takes the best point; here all that match about as well as the best locate the centre together.
-    A point that does not match follows from the centre and the mean size, and signals a partial occlusion.
-    """
-    size = np.maximum(sizes(expected), 1.0)  # (K, 2)
-    seen = generic_points(boxes)  # (K, 5, 2)
-    error = np.hypot(*np.moveaxis((seen - generic_points(expected)) / size[:, None], 2, 0))  # (K, 5)
-    best = error.min(axis=1)
-    good = error <= np.maximum(tolerance, best + tolerance / 2)[:, None]
-    implied = seen - OFFSETS * size[:, None]  # (K, 5, 2) centres
-    centre = (implied * good[:, :, None]).sum(axis=1) / good.sum(axis=1)[:, None]  # (K, 2)
-    points = np.where(good[:, :, None], seen, centre[:, None] + OFFSETS * size[:, None])
-    points[:, CENTRE] = centre
-    short = sizes(boxes) < (1 - tolerance) * size  # (K, 2)
-    bad = ~good[:, _SIDE_POINTS] & np.tile(short, 2)  # (K, 4) left, top, right, bottom
-    bad &= good[:, (RIGHT, BOTTOM, LEFT, TOP)]  # the other side stands where it should
-    hidden = (bad * (1 << np.arange(4))).sum(axis=1).astype(np.int8)
-    return Fit(points.astype(np.float32), good, hidden, centres(expected))
 
 
 def side_words(hidden: NDArray[np.int8]) -> list[str]:

@@ -10,7 +10,7 @@ from perdure.features.boxes import areas, centres, hull, intersections, sizes
 from perdure.trackers.compound.bodies import Bodies, learnt
 from perdure.trackers.compound.gathering import HIDDEN, Held
 from perdure.trackers.compound.meetings import company
-from perdure.trackers.compound.targets import CENTRE, Fit, Targets, extended, fit, generic_points
+from perdure.trackers.compound.targets import CENTRE, Targets, extended, generic_points
 from perdure.types import Boxes, Image, Regions
 
 Index = NDArray[np.intp]
@@ -61,10 +61,7 @@ def update(
     if len(single):
         boxes = _own_boxes(single, region, held, regions)
         start = np.where(targets.frozen[single][:, None], held.boxes[single], expected[single])
-        targets = _visible(targets, single, boxes, fit(start, boxes, partial), time, size, partial, inertia)
-        targets = targets.with_(
-            single, scores=regions.scores[region[single]], classes=regions.classes[region[single]]
-        )
+        targets = _visible(targets, single, start, boxes, region[single], regions, (time, size), partial, inertia)
     if len(shared):
         targets = _believed(targets, shared, held, time)
     temporary = np.flatnonzero((region >= 0) & targets.temporary & (targets.lines.last[:, 0] < time))
@@ -88,39 +85,33 @@ def _own_boxes(rows: Index, region: Index, held: Held, regions: Regions) -> Boxe
 def _visible(
     targets: Targets,
     rows: Index,
+    expected: Boxes,
     boxes: Boxes,
-    fitted: Fit,
-    time: float,
-    size: tuple[int, int],
+    region: Index,
+    regions: Regions,
+    moment: tuple[float, tuple[int, int]],
     partial: float,
     inertia: float,
 ) -> Targets:
-    """Extend the trajectories of targets (K,) that have regions (K, 4) of their own; average their sizes.
+    """Locate targets (K,), expected at boxes (K, 4), by their regions' boxes; extend trajectories, average sizes."""
+    from perdure.maths.kernels.follow import follow
 
-    The mean size follows where both sides match or the middle does, fast while a target comes into view, and slowly
-    against what looks like a partial occlusion.
-    """
-    seen, mean = sizes(boxes), targets.size[rows]  # (K, 2)
+    time, (height, width) = moment
     elapsed = time - targets.seen[rows]
-    pace = np.minimum(1.0, np.maximum(1.0 / (targets.hits[rows] + 1), elapsed / max(inertia, 1e-6)))[:, None]
-    centred = np.abs(centres(boxes) - fitted.expected) <= partial / 2 * mean
-    border = np.array([size[1], size[0]], np.float32)
-    cut = (boxes[:, :2] <= 1) | (boxes[:, 2:] >= border - 1)
-    entering = (seen > mean) & (cut | (time - targets.born[rows] < _ENTERING)[:, None])
-    whole = (np.abs(seen - mean) <= partial * mean) | centred | entering
-    pace = np.where(entering, 1.0, pace)
-    pace = np.where(whole, pace, np.where(seen > mean, pace / 2, pace / 8))
-    mean = np.maximum(mean + pace * (seen - mean), 1.0).astype(np.float32)
-    targets = extended(targets, rows, time, fitted.points[:, CENTRE], mean)
-    partly = np.where(fitted.hidden > 0, targets.partly[rows] + elapsed, 0.0)
+    pace = np.minimum(1.0, np.maximum(1.0 / (targets.hits[rows] + 1), elapsed / max(inertia, 1e-6)))
+    entering, picture = time - targets.born[rows] < _ENTERING, np.array([width, height], np.float32)
+    points, hidden, size = follow(expected, boxes, entering, pace.astype(np.float32), picture, partial)
+    targets = extended(targets, rows, time, points[:, CENTRE], size)
     return targets.with_(
         rows,
-        points=fitted.points,
-        size=mean,
+        points=points,
+        size=size,
         seen=time,
         hits=targets.hits[rows] + 1,
-        hidden=fitted.hidden,
-        partly=partly,
+        hidden=hidden,
+        partly=np.where(hidden > 0, targets.partly[rows] + elapsed, 0.0),
+        scores=regions.scores[region],
+        classes=regions.classes[region],
     )
 
 
