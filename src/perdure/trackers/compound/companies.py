@@ -64,6 +64,7 @@ def accompany(
         pair = pair._replace(end=frame.index, until=frame.time)
         known[keys] = pair._replace(distance=distance, nearest=frame.index) if distance <= pair.distance else pair
     names = dict(zip(targets.keys.tolist(), targets.ids.tolist(), strict=True))
+    seen = set(targets.keys[region >= 0].tolist())
     met: dict[int, list[Pair]] = {}
     parted: dict[int, list[Pair]] = {}
     for keys, pair in list(known.items()):
@@ -71,7 +72,9 @@ def accompany(
         if keys in now and not pair.told and named and frame.time - pair.since >= _LASTING - 1e-9:
             met.setdefault(pair.begin, []).append(pair)
             known[keys] = pair._replace(told=True)
-        elif keys not in now and not blind and (frame.time - pair.until >= _PARTED - 1e-9 or not named):
+        elif keys in now or blind or (named and not seen & set(keys)):
+            continue
+        elif frame.time - pair.until >= _PARTED - 1e-9 or not named:
             if pair.told and named:
                 parted.setdefault(pair.end + 1, []).append(pair)
             del known[keys]

@@ -75,6 +75,8 @@ def form(
     region = held.region.copy()
     together = company(targets, region)
     ambiguous = (together > 1) | ((region >= 0) & targets.frozen)
+    if regions.blind:
+        return Meeting(targets, compounds, next_key, region)
     if not ambiguous.any():
         return Meeting(_ended(targets, targets.temporary), compounds, next_key, region)
     fresh = ambiguous & (targets.compound == 0)
@@ -174,7 +176,7 @@ def resolve(
             others = np.flatnonzero(mine & (targets.compound == compound.key))
             box = regions.boxes[meeting.region[[temporary]]]
             gaps = distances_between(box, regions.boxes[meeting.region[others[others != temporary]]])[0]
-            lasted = frame.time - targets.born[temporary]
+            lasted = frame.time - targets.shared[rows[0]]
             if gaps.min(initial=np.inf) > apart * sizes(box).min() or lasted >= settle - 1e-9:
                 meeting, row = identify(meeting, compound, int(rows[0]))
                 targets = meeting.targets.with_([row], compound=0, within=0)

@@ -29,6 +29,7 @@ class Found(NamedTuple):
 
     targets: Targets
     region: Index  # (N,)
+    keys: dict[int, int]  # of found targets: the key each had as a new one -> the one it has
     events: tuple[Event, ...]
     renamed: tuple[Renamed, ...]
 
@@ -64,7 +65,7 @@ def recall(
     now : function
         Signature of what is seen where a member of a compound is believed.
     """
-    region, events, renamed = region.copy(), [], []
+    region, events, renamed, keys = region.copy(), [], [], {}
     young, old = _young(targets, region, frame.time, size, confirm), _missing(targets, region, motion, size)
     looks = {int(row): signature(targets.looks[row]) for row in (*young, *old)} if len(young) and len(old) else {}
     for new in young if looks else ():
@@ -83,9 +84,12 @@ def recall(
         targets = targets.with_(
             [new], ids=name, hits=targets.hits[best] + targets.hits[new], born=targets.born[best]
         )
+        ours, theirs = int(targets.keys[new]), int(targets.keys[best])
+        keys[ours] = theirs
+        targets = targets.with_([new, best], keys=[theirs, ours])
         targets = targets.with_([best], ids=0, compound=0, within=0, missed=np.inf)
         region[best] = -1
-    return Found(targets, region, tuple(events), tuple(renamed))
+    return Found(targets, region, keys, tuple(events), tuple(renamed))
 
 
 def _young(targets: Targets, region: Index, time: float, size: tuple[int, int], confirm: float) -> Index:

@@ -48,11 +48,13 @@ def say(targets: Targets, next_id: int, unsaid: Tracks, moment: Moment, confirm:
     spoken, rows = _rows(targets, group, moment, patience)
     said, late = rows, Tracks.empty()
     events: list[Event] = []
-    if named.any():
-        late = unsaid.take(np.isin(unsaid.ids, targets.keys[named]))
+    known = np.isin(unsaid.ids, targets.keys[targets.ids > 0])
+    if known.any():
         order = np.argsort(targets.keys)
+        late = unsaid.take(known)
         late = late.replace(ids=targets.ids[order][np.searchsorted(targets.keys[order], late.ids)])
-        unsaid = unsaid.take(~np.isin(unsaid.ids, targets.keys[named]))
+        unsaid = unsaid.take(~known)
+    if named.any():
         things = np.flatnonzero(named & ~targets.temporary).tolist()
         begins = zip(targets.first[things].tolist(), targets.ids[things].tolist(), strict=True)
         events = [Event("entered", begin, begin, (one,)) for begin, one in begins]
@@ -111,7 +113,8 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
         sure = np.where(shared, np.where(clear, share, np.minimum(share, _UNSEEN)), sure)
         inferred = inferred | (shared & (share < HIDDEN))
     masks = _masks(rows, region, shared, group, moment)
-    names = dict(zip(targets.keys[group].tolist(), targets.ids[group].tolist(), strict=True))
+    told = group & (moment.region >= 0)
+    names = dict(zip(targets.keys[told].tolist(), targets.ids[told].tolist(), strict=True))
     return rows, Tracks.of(
         frames=moment.frame.index,
         times=moment.frame.time,

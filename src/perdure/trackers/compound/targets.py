@@ -41,6 +41,7 @@ class Targets:
     ]  # (N, 5) time, x, y, speed x, speed y when last tracked by itself, before an ambiguity
     born: NDArray[np.float64]  # (N,) s, first seen
     seen: NDArray[np.float64]  # (N,) s, last seen by itself
+    shared: NDArray[np.float64]  # (N,) s, when it last shared a region
     missed: NDArray[np.float64]  # (N,) s for which it might have been seen since, and was not
     partly: NDArray[np.float64]  # (N,) s for which a side has been hidden
     hits: NDArray[np.int64]  # (N,) regions it had for itself
@@ -105,6 +106,7 @@ def newborn(frame: Frame, boxes: Boxes, scores: Float, classes: NDArray[np.str_]
         ice=np.zeros((count, 5)),
         born=now,
         seen=now,
+        shared=np.full(count, -np.inf),
         missed=np.zeros(count),
         partly=np.zeros(count),
         hits=np.ones(count, np.int64),

@@ -16,11 +16,11 @@ from perdure.trackers.compound.identity import Judge
 from perdure.trackers.compound.matrix import Thresholds, match
 from perdure.trackers.compound.meetings import Compound as Record
 from perdure.trackers.compound.meetings import form, resolve
-from perdure.trackers.compound.recalling import leaving, recall
+from perdure.trackers.compound.recalling import Found, leaving, recall
 from perdure.trackers.compound.saying import Moment, happenings, say
 from perdure.trackers.compound.targets import Float, Targets, motions, newborn, predicted
 from perdure.trackers.compound.updating import learn, looked, unclaimed, update
-from perdure.types import Boxes, Event, Frame, Mask, Regions, Renamed, Report, Scene, Tracks
+from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Tracks
 
 _UNNAMED = 0.2  # distance that a target without a name is put behind others
 _UNSEEN = 0.2  # the same of one not seen for `patience` seconds
@@ -122,11 +122,12 @@ class Compound:
         bodies = state.bodies
         if _are_silhouettes(regions):  # a detector's boxes hold whole bodies as they are
             bodies = learn(bodies, targets, region, time - state.time, state.size, _BODIES)
-        targets, region, recalled, renamed = self._recalled(targets, region, held, frame, regions, state.size)
+        targets, found = self._recalled(targets, region, held, frame, regions, state.size)
+        region, unsaid = found.region, _rekeyed(state.unsaid, found.keys)
         company = accompany(state.pairs, targets, region, frame, regions.blind)
         where = np.concatenate([expected, targets.boxes[len(expected) :]])
         moment = Moment(frame, regions, region, held, where, state.size)
-        said = say(targets, state.next_id, state.unsaid, moment, self.confirm, self.patience)
+        said = say(targets, state.next_id, unsaid, moment, self.confirm, self.patience)
         told = happenings(state.targets, said.targets, moment)
         kept, gone = self._retired(said.targets, region, frame, state.size, regions.blind)
         live = set(kept.compound.tolist())
@@ -135,8 +136,8 @@ class Compound:
         state = CompoundState(
             kept, said.unsaid, compounds, company.pairs, bodies, key, said.next_id, time, state.size
         )
-        events = (*said.events, *company.events, *meeting.events, *recalled, *told, *gone)
-        return state, Report(said.rows, renamed=(*meeting.renamed, *renamed), events=events)
+        events = (*said.events, *company.events, *meeting.events, *found.events, *told, *gone)
+        return state, Report(said.rows, renamed=(*meeting.renamed, *found.renamed), events=events)
 
     def finish(self, state: CompoundState) -> Report:
         """Return what is left to say: nothing."""
@@ -180,11 +181,11 @@ class Compound:
         frame: Frame,
         regions: Regions,
         size: tuple[int, int],
-    ) -> tuple[Targets, NDArray[np.intp], tuple[Event, ...], tuple[Renamed, ...]]:
+    ) -> tuple[Targets, Found]:
         """Bring looks up to date and find lost targets again by them; nothing without a picture."""
         image = frame.image
         if image is None or not self.colour:
-            return targets, region, (), ()
+            return targets, Found(targets, region, {}, (), ())
 
         def now(row: int) -> Float:
             x1, y1, x2, y2 = map(float, held.boxes[row])
@@ -192,7 +193,7 @@ class Compound:
 
         targets = looked(targets, region, image, regions)
         found = recall(targets, region, motions(targets), frame, size, self.confirm, self.likeness, now)
-        return found.targets, found.region, found.events, found.renamed
+        return found.targets, found
 
     def _retired(
         self, targets: Targets, region: NDArray[np.intp], frame: Frame, size: tuple[int, int], blind: bool
@@ -221,6 +222,11 @@ _SECOND = 0.5  # distance up to which a region of low score may be a target
 _BLOBS = (0.1, 2.0)  # gain and distance of unions that merge, where regions are silhouettes
 _BOXES = (0.35, 0.25)  # and where they are a detector's boxes, which seldom hold two
 _BODIES = 120.0  # s of observation after which the size of bodies is forgotten
+
+
+def _rekeyed(unsaid: Tracks, keys: dict[int, int]) -> Tracks:
+    """Rows of targets without a name, some of which have turned out to be others."""
+    return unsaid.replace(ids=[keys.get(one, one) for one in unsaid.ids.tolist()]) if keys else unsaid
 
 
 def _are_silhouettes(regions: Regions) -> bool:

@@ -119,7 +119,7 @@ def _believed(targets: Targets, rows: Index, held: Held, time: float) -> Targets
     """Put ambiguous targets where they are believed; who is hidden keeps the motion she was last seen with."""
     points = generic_points(held.boxes[rows])
     clear = held.share[rows] >= HIDDEN
-    targets = targets.with_(rows, points=points, hidden=0, partly=0.0)
+    targets = targets.with_(rows, points=points, hidden=0, partly=0.0, shared=time)
     return extended(targets, rows[clear], time, points[clear, CENTRE], targets.size[rows[clear]])
 
 
