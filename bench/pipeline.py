@@ -73,7 +73,7 @@ def time_stages(video: str, limit: int) -> dict[str, float]:
     from perdure.files.film import Film
     from perdure.files.log import RunLog
     from perdure.files.video import open_source
-    from perdure.trackers.overlap import Overlap
+    from perdure.trackers import TRACKERS
 
     source = open_source(video, end=f"{limit}f")
     timer = Timer()
@@ -90,11 +90,14 @@ def time_stages(video: str, limit: int) -> dict[str, float]:
     for foreground in masks:
         stage = detector.stage(scene.height, foreground.size)
         regions.append(timer.add("components", lambda f=foreground, s=stage: regions_of(f, s)))
-    tracker = Overlap()
-    tracked = tracker.start(scene)
-    for frame, seen in zip(frames, regions, strict=True):
-        tracked, report = timer.add("tracker", lambda s=tracked, f=frame, r=seen: tracker.step(s, f, r))
-        reports.append(report)
+    for name in ("overlap", "compound"):  # the log, the paint and the film are the last one's
+        tracker, reports = TRACKERS[name](), []
+        tracked = tracker.start(scene)
+        for frame, seen in zip(frames, regions, strict=True):
+            tracked, report = timer.add(
+                f"tracker {name}", lambda t=tracker, s=tracked, f=frame, r=seen: t.step(s, f, r)
+            )
+            reports.append(report)
     with tempfile.TemporaryDirectory() as folder:
         with RunLog(Path(folder) / "log") as log:
             for frame, report in zip(frames, reports, strict=True):

@@ -10,7 +10,7 @@ from perdure.types.tracks import Tracks
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened: merge, split, occluded, reappeared, resolved, entered, left, …
+    """Something that happened: merge, split, occluded, found_again, resolved, entered, left, …
 
     `begin` and `end` are frames (equal for a moment); `why` names the rule and its figures.
     """
