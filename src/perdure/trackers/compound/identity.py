@@ -56,7 +56,9 @@ class Judge:
             row = best
         name, index = int(meeting.targets.ids[row]), self.frame.index
         sure = 1 / (1 + np.exp(-abs(verdict.odds - _BELIEF)))
-        event = Event("resolved", index, index, (name,), confidence=float(sure), why=verdict.why)
+        others = sorted(int(targets.ids[one]) for one in rivals if one != row)
+        met = f" (met {', '.join(map(str, others))})" if others else ""
+        event = Event("resolved", index, index, (name,), confidence=float(sure), why=verdict.why + met)
         return replace(meeting, events=(*meeting.events, event) if name else meeting.events), row
 
     def doubt(self, meeting: Meeting, row: int, rival: int) -> Verdict:

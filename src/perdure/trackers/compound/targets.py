@@ -50,6 +50,7 @@ class Targets:
     hidden: NDArray[np.int8]  # (N,) bits of the hidden sides, in the order of SIDES
     looks: Float  # (N, *GRID, 4) mean colour and share seen of every cell of the box
     first: NDArray[np.int64]  # (N,) the frame in which it was first seen
+    latest: NDArray[np.int64]  # (N,) the last frame in which it had a region
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -115,6 +116,7 @@ def newborn(frame: Frame, boxes: Boxes, scores: Float, classes: NDArray[np.str_]
         hidden=np.zeros(count, np.int8),
         looks=np.zeros((count, *GRID, 4), np.float32),
         first=np.full(count, frame.index, np.int64),
+        latest=np.full(count, frame.index, np.int64),
     )
 
 

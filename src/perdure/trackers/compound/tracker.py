@@ -61,10 +61,14 @@ class Compound:
     birth_score: float = parameter(0.7, "score from which a region may be a new target", low=0.0, high=1.0)
     weak_score: float = parameter(0.1, "score from which a region gets a second look", low=0.0, high=1.0)
     patience: float = parameter(
-        2.0, "how long a target that is not seen is looked for", unit="s", low=0.0, high=3600.0
+        2.0, "how long a target that is not seen is looked for where it was going", unit="s", low=0.0, high=3600.0
     )
     recall: float = parameter(
-        6.0, "how long it may be found again by its looks (with pictures)", unit="s", low=0.0, high=3600.0
+        6.0,
+        "how long a target lost inside the picture may be found again by its colours",
+        unit="s",
+        low=0.0,
+        high=3600.0,
     )
     longest: float = parameter(
         10.0, "how long a target may be hidden by others in one region", unit="s", low=0.0, high=3600.0
@@ -118,7 +122,7 @@ class Compound:
             targets = targets.join(newborn(frame, regions.boxes[births], scores, classes, meeting.next_key))
         region = np.concatenate([meeting.region, births])
         waited = 0.0 if regions.blind else time - state.time
-        targets = _waited(targets, region, held, waited)
+        targets = _waited(targets, region, held, waited, frame.index)
         bodies = state.bodies
         if _are_silhouettes(regions):  # a detector's boxes hold whole bodies as they are
             bodies = learn(bodies, targets, region, time - state.time, state.size, _BODIES)
@@ -140,8 +144,11 @@ class Compound:
         return state, Report(said.rows, renamed=(*meeting.renamed, *found.renamed), events=events)
 
     def finish(self, state: CompoundState) -> Report:
-        """Return what is left to say: nothing."""
-        return Report.empty()
+        """Return what is left to say: who had left when the film ended."""
+        targets = state.targets
+        unseen = (targets.ids > 0) & ~targets.temporary & ~targets.frozen & (targets.missed > 0)
+        out = np.flatnonzero(unseen & leaving(targets, motions(targets), state.size))
+        return Report(events=tuple(_gone(targets, out, int(targets.latest.max(initial=0)), state.size)))
 
     def _gathered(self, state: CompoundState, expected: Boxes, frame: Frame, regions: Regions) -> Held:
         """Who is in which region; hidden members of compounds are looked for too, where they would have come out."""
@@ -201,15 +208,14 @@ class Compound:
         """Let go of who was not seen for long (IV.D), and of unnamed ones at the first miss."""
         remembered = self.recall if frame.image is not None and self.colour else self.patience
         limit = np.where(targets.frozen, self.longest, max(remembered, self.patience)) + 1e-9
+        if (targets.missed > self.patience).any():  # who was going out over the border will not be found again
+            limit = np.where(
+                ~targets.frozen & leaving(targets, motions(targets), size), self.patience + 1e-9, limit
+            )
         unnamed = ~targets.temporary & (targets.ids == 0)
         kept = np.where(unnamed, ((region >= 0) | blind) & np.isfinite(targets.missed), targets.missed <= limit)
         kept |= targets.temporary & blind & np.isfinite(targets.missed)
-        gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
-        out = leaving(targets, motions(targets), size) if len(gone) else kept
-        events = [
-            Event("left" if out[row] else "lost", frame.index, frame.index, (int(targets.ids[row]),))
-            for row in gone
-        ]
+        events = _gone(targets, np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary), frame.index, size)
         if not kept.all():
             targets = targets.take(kept)
         if not targets.compound.any():
@@ -234,9 +240,30 @@ def _are_silhouettes(regions: Regions) -> bool:
     return any(mask.bits.size for mask in regions.masks)
 
 
-def _waited(targets: Targets, region: NDArray[np.intp], held: Held, waited: float) -> Targets:
+def _gone(targets: Targets, rows: NDArray[np.intp], index: int, size: tuple[int, int]) -> list[Event]:
+    """What is told of targets that are let go: from the first frame without them, whether they left or were lost."""
+    if not len(rows):
+        return []
+    out = leaving(targets, motions(targets), size)
+    return [
+        Event(
+            "left" if out[row] else "lost",
+            min(int(targets.latest[row]) + 1, index),
+            index,
+            (int(targets.ids[row]),),
+            why="over the border" if out[row] else "not seen again inside the picture",
+        )
+        for row in rows.tolist()
+    ]
+
+
+def _waited(targets: Targets, region: NDArray[np.intp], held: Held, waited: float, index: int) -> Targets:
     """Targets with the time for which each was not seen; who shows too little of herself is not."""
     known = np.arange(len(targets)) < len(held.share)
     hidden = known & (np.append(held.share, 0.0)[np.minimum(np.arange(len(targets)), len(held.share))] < HIDDEN)
     seen = (region >= 0) & (targets.temporary | ~hidden)
-    return replace(targets, missed=np.where(seen & np.isfinite(targets.missed), 0.0, targets.missed + waited))
+    return replace(
+        targets,
+        missed=np.where(seen & np.isfinite(targets.missed), 0.0, targets.missed + waited),
+        latest=np.where(seen, index, targets.latest),
+    )
