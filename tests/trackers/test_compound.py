@@ -311,6 +311,8 @@ def test_three_in_two_regions_are_one_company_until_one_has_moved_away():
     assert [names(said.tracks, world, frame) for frame in (10, 35, 43, 65)] == [[2, 3, 1]] * 4
     assert [(begin > 45, ids) for _, begin, ids in said.told("resolved")] == [(True, (1,))]
     assert said.told("split")[0][2] == (1, 2, 3)
+    assert said.told("mixed") == [("mixed", 41, (1, 2, 3))]
+    assert said.why("mixed")[0].startswith("3 targets in 2 regions")
 
 
 def test_without_colours_two_who_stood_in_one_place_and_go_back_are_taken_for_passing():

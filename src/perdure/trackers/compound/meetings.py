@@ -84,7 +84,7 @@ def form(
     ice = np.column_stack([now, targets.points[:, CENTRE], motion])
     meeting = Meeting(targets.with_(fresh, ice=ice[fresh]), compounds, next_key, region)
     meeting = _bound(meeting, np.unique(region[together > 1]), frame)
-    return _with_temporaries(meeting, ambiguous, frame, regions)
+    return _mixed(_with_temporaries(meeting, ambiguous, frame, regions), frame)
 
 
 def _bound(meeting: Meeting, crowded: Index, frame: Frame) -> Meeting:
@@ -146,6 +146,21 @@ def _with_temporaries(meeting: Meeting, ambiguous: NDArray[np.bool_], frame: Fra
         targets = targets.join(born.with_(np.arange(len(born)), temporary=True, compound=owners))
         region = np.concatenate([region, numbers])
     return replace(meeting, targets=targets, region=region, next_key=next_key)
+
+
+def _mixed(meeting: Meeting, frame: Frame) -> Meeting:
+    """Tell of compounds that have become mixed: several targets in several regions, some of them together (fig. 2)."""
+    targets, events, compounds = meeting.targets, list(meeting.events), []
+    for one in meeting.compounds:
+        mine = (targets.compound == one.key) & (meeting.region >= 0)
+        members, temporary = np.flatnonzero(mine & ~targets.temporary), int((mine & targets.temporary).sum())
+        if one.kind == "merge" and len(members) > temporary > 1:
+            one = replace(one, kind="mixed")
+            ids = tuple(sorted(int(name) for name in targets.ids[members] if name))
+            why = f"{len(members)} targets in {temporary} regions, in one compound since frame {one.frame}"
+            events.append(Event("mixed", frame.index, frame.index, ids, why=why))
+        compounds.append(one)
+    return replace(meeting, compounds=tuple(compounds), events=tuple(events))
 
 
 def resolve(
