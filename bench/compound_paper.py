@@ -74,7 +74,7 @@ def main() -> None:
         print("\n\n".join(plain(one) for one in result.tables))
         if arguments.write:
             text = PAGE.read_text(encoding="utf-8")
-            command = " ".join(["python bench/compound_paper.py", *sys.argv[1:]])
+            command = "python bench/compound_paper.py --write"
             with whole_file(PAGE) as file:
                 file.write(replaced(text, section(command, result)))
         if arguments.json:

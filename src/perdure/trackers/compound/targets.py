@@ -15,7 +15,7 @@ from perdure.types import Boxes, Frame
 
 Float = NDArray[np.float32]
 Index = NDArray[np.intp]
-CENTRE, TOP, BOTTOM, LEFT, RIGHT = range(5)
+CENTRE = 0  # of the generic points: centre, top, bottom, left, right
 OFFSETS = np.array([[0, 0], [0, -0.5], [0, 0.5], [-0.5, 0], [0.5, 0]], np.float32)  # of the points, in sizes
 SIDES = ("left", "top", "right", "bottom")
 TOLERANCE = 0.12  # target sizes that a location may lie off a segment
