@@ -16,7 +16,7 @@ Boxes = NDArray[np.float32]
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
     """A read-only view; the owner's own array stays as it is."""
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)
     return view
 
 

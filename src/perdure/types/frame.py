@@ -54,7 +54,7 @@ class Mask:
     @staticmethod
     def empty() -> Mask:
         """Return the mask of nothing."""
-        return Mask(0, 0, np.zeros((0, 0), np.bool_))
+        return _NOTHING
 
     @staticmethod
     def of_image(bits: Bits, y: int = 0, x: int = 0) -> Mask:
@@ -93,3 +93,6 @@ class Mask:
         )
 
     __hash__ = None  # type: ignore[assignment]
+
+
+_NOTHING = Mask(0, 0, np.zeros((0, 0), np.bool_))

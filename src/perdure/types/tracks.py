@@ -6,6 +6,7 @@ import dataclasses
 import enum
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -90,12 +91,13 @@ class Tracks:
     links: tuple[tuple[int, ...], ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "boxes", as_boxes(self.boxes))
+        columns = vars(self)  # set here, and never again
+        columns["boxes"] = as_boxes(self.boxes)
         for name, dtype in _TRACK_DTYPES.items():
-            object.__setattr__(self, name, frozen(np.asarray(getattr(self, name), dtype)))
+            columns[name] = frozen(np.asarray(columns[name], dtype))
         for name in ("masks", "believed", "ground", "links"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_lengths(len(self.boxes), {name: getattr(self, name) for name in TRACK_COLUMNS})
+            columns[name] = tuple(columns[name])
+        check_lengths(len(self.boxes), columns)
 
     @staticmethod
     def of(
@@ -120,12 +122,12 @@ class Tracks:
         >>> Tracks.of(frames=0, times=0.0, ids=[1, 2], boxes=[[0, 0, 9, 9], [5, 5, 9, 9]]).ids.tolist()
         [1, 2]
         """
-        boxes = as_boxes(boxes)
-        count = len(boxes)
+        boxes = np.asarray(boxes, np.float32)
+        count = boxes.size // 4
 
         def column(given: ArrayLike | None, default: object, dtype: Any) -> NDArray[Any]:
             values = np.asarray(default if given is None else given, dtype)
-            return np.broadcast_to(values, (count,)) if values.ndim == 0 else values
+            return values.repeat(count) if values.ndim == 0 else values
 
         return Tracks(
             frames=column(frames, 0, np.int64),
@@ -172,9 +174,10 @@ class Tracks:
         if np.array_equal(index, np.arange(len(self))):
             return self  # all of them, as they are
         columns: dict[str, Any] = {}
+        numbers = index.tolist()
         for name in TRACK_COLUMNS:
             values = getattr(self, name)
-            columns[name] = tuple(values[i] for i in index) if isinstance(values, tuple) else values[index]
+            columns[name] = tuple(values[i] for i in numbers) if isinstance(values, tuple) else values[index]
         return Tracks(**columns)
 
     def replace(self, **columns: Any) -> Tracks:
@@ -261,7 +264,7 @@ _TRACK_DTYPES: Mapping[str, Any] = {
 
 def _chain(pieces: Sequence[Any]) -> Any:
     if isinstance(pieces[0], tuple):
-        return tuple(value for piece in pieces for value in piece)
+        return tuple(chain.from_iterable(pieces))
     return np.concatenate(pieces)
 
 
