@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.boxes import areas, centres, intersections, sizes
+from perdure.features.boxes import areas, hull
 from perdure.types import Boxes
 
 Float = NDArray[np.float32]
@@ -47,20 +47,9 @@ def distances(regions: Boxes, targets: Boxes) -> Float:
     1 - intersection / union where they intersect, else 1 + distance of the centres / the larger side of both: in
     [0, inf).
     """
-    shared = intersections(regions, targets)
-    distance = np.zeros(shared.shape, np.float32)
-    touch = shared > 0
-    row, column = np.nonzero(touch)
-    both = shared[row, column]
-    union = areas(regions)[row] + areas(targets)[column] - both
-    distance[row, column] = 1 - np.divide(both, union, out=np.zeros_like(both), where=union > 0)
-    x, y = centres(regions).T[:, :, None] - centres(targets).T[:, None, :]  # (R, T) each
-    largest = np.maximum(
-        sizes(regions).max(axis=1, initial=1e-6)[:, None], sizes(targets).max(axis=1, initial=1e-6)
-    )
-    np.divide(np.sqrt(x * x + y * y), largest, out=distance, where=~touch)
-    np.add(distance, 1.0, out=distance, where=~touch)
-    return distance
+    from perdure.maths.kernels.overlaps import distances as kernel
+
+    return kernel(regions, targets)
 
 
 class Near(NamedTuple):
@@ -69,30 +58,25 @@ class Near(NamedTuple):
     region: Index  # (K,)
     target: Index  # (K,)
     distance: Float  # (K,)
+    alike: NDArray[np.bool_]  # (K,) of similar size
 
 
-def near(regions: Boxes, targets: Boxes, farthest: float) -> Near:
-    """Return the entries of the matrix with distances below `farthest`; where boxes must touch, only those are looked at."""
-    if farthest > 1:
-        every = distances(regions, targets)
-        region, target = np.nonzero(every < farthest)
-        return Near(region, target, every[region, target])
-    shared = intersections(regions, targets)
-    region, target = np.nonzero(shared)
-    both = shared[region, target]
-    distance = 1 - both / (areas(regions)[region] + areas(targets)[target] - both)
-    kept = distance < farthest
-    return Near(region[kept], target[kept], distance[kept])
+def near(regions: Boxes, targets: Boxes, farthest: float, size_ratio: float) -> Near:
+    """Return the entries of the matrix with distances below `farthest`, and which are of similar size.
 
-
-def correspond(entries: Near, regions: Boxes, targets: Boxes, size_ratio: float) -> NDArray[np.bool_]:
-    """Return which entries (K,) of the ambiguity matrix are correspondences: close, and of similar size.
-
-    The thresholds are large on purpose. A region that is one piece of a target, or a target that is one member of a
-    merged region, fails the test of size against the whole; `match` finds those by testing unions.
+    An entry of similar size is a correspondence. The thresholds are large on purpose. A region that is one piece of a
+    target, or a target that is one member of a merged region, fails the test of size against the whole; `match` finds
+    those by testing unions.
     """
-    one, other = areas(regions)[entries.region], areas(targets)[entries.target]
-    return np.asarray(np.maximum(one, other) <= size_ratio * np.maximum(np.minimum(one, other), 1e-6))
+    if farthest <= 1:  # only boxes that touch need to be looked at
+        from perdure.maths.kernels.overlaps import nearby
+
+        return Near(*nearby(regions, targets, farthest, size_ratio))
+    every = distances(regions, targets)
+    region, target = np.nonzero(every < farthest)
+    one, other = areas(regions)[region], areas(targets)[target]
+    alike = np.maximum(one, other) <= size_ratio * np.maximum(np.minimum(one, other), 1e-6)
+    return Near(region, target, every[region, target], alike)
 
 
 def match(
@@ -115,10 +99,11 @@ def match(
     limits : Thresholds
         What makes a correspondence.
     """
-    sure, weak = scores >= limits.sure, (scores >= limits.least) & (scores < limits.sure)
-    entries = near(regions, targets, limits.distance)
-    allowed = correspond(entries, regions, targets, limits.size_ratio) | whole[entries.target]
-    worth = Near(entries.region, entries.target, entries.distance + cost[entries.target])
+    sure = scores >= limits.sure
+    weak = (scores >= limits.least) & ~sure
+    entries = near(regions, targets, limits.distance, limits.size_ratio)
+    allowed = entries.alike | whole[entries.target]
+    worth = entries._replace(distance=entries.distance + cost[entries.target])
     taken = np.full(len(regions), -1, np.intp)  # target of each region
     _one_to_one(taken, worth, allowed & sure[entries.region], limits.distance + 1)
     if weak.any():
@@ -133,10 +118,12 @@ def match(
 
 def _one_to_one(taken: Index, entries: Near, allowed: NDArray[np.bool_], limit: float) -> None:
     """Note in `taken` the target of each region: least sum, where a pair costs less than leaving both alone."""
+    from perdure.maths.kernels.counts import uncontested
+
     region, target = entries.region[allowed], entries.target[allowed]
     if not len(region):
         return
-    plain = (np.bincount(region)[region] == 1) & (np.bincount(target)[target] == 1)
+    plain = uncontested(region, target)
     taken[region[plain]] = target[plain]
     if plain.all():
         return
@@ -158,11 +145,14 @@ def _merges(regions: Boxes, targets: Boxes, taken: Index, limits: Thresholds) ->
     free = np.flatnonzero(left)
     if not len(free) or not len(regions):
         return []
-    inside = intersections(regions, targets[free]) / np.maximum(areas(targets[free]), 1e-6)  # (R, F)
+    from perdure.maths.kernels.overlaps import shares
+
+    inside = shares(targets[free], regions)  # (F, R)
     edges = []
-    for region in np.flatnonzero((inside >= limits.share).any(axis=1)):
+    for region in np.flatnonzero((inside >= limits.share).any(axis=0)):
+        part = inside[:, region]  # (F,)
         members = [int(taken[region])] if taken[region] >= 0 else []
-        others = free[np.argsort(-inside[region], kind="stable")][: int((inside[region] >= limits.share).sum())]
+        others = free[np.argsort(-part, kind="stable")][: int((part >= limits.share).sum())]
         for other in map(int, others):
             if members and not _gains(regions[region], targets[members], targets[other], limits.gain, limits.near):
                 continue
@@ -184,30 +174,28 @@ def _splits(
     free = np.flatnonzero((taken < 0) & sure)
     if not len(free) or not len(targets):
         return []
-    inside = intersections(regions[free], targets) / np.maximum(areas(regions[free]), 1e-6)[:, None]  # (F, T)
-    own = {int(target): region for region, target in enumerate(taken) if target >= 0}
+    from perdure.maths.kernels.overlaps import shares
+
+    inside = shares(regions[free], targets)  # (F, T)
+    parts = np.flatnonzero((inside >= limits.share).any(axis=1))
+    own = {target: region for region, target in enumerate(taken.tolist()) if target >= 0} if len(parts) else {}
     edges = []
     scattered: dict[int, list[int]] = {}
-    for place, region in enumerate(free):
-        target = int(np.argmax(inside[place]))
-        if inside[place, target] < limits.share:
-            continue
+    for region, target in zip(free[parts].tolist(), inside[parts].argmax(axis=1).tolist(), strict=True):
         mine = own.get(target)
         if mine is None:
             if whole[target]:
-                edges.append((target, int(region)))
+                edges.append((target, region))
             else:
-                scattered.setdefault(target, []).append(int(region))
+                scattered.setdefault(target, []).append(region)
         elif whole[target] or _gains(
             targets[target], regions[[mine]], regions[region], limits.gain / 4, limits.near
         ):
-            edges.append((target, int(region)))
-    for target, parts in scattered.items():
-        union = np.concatenate([regions[parts, :2].min(axis=0), regions[parts, 2:].max(axis=0)])[None]
-        entry = near(union, targets[[target]], limits.distance)
-        whole_one = correspond(entry, union, targets[[target]], limits.size_ratio)
-        if len(parts) > 1 and len(whole_one) and whole_one.all():
-            edges += [(target, part) for part in parts]
+            edges.append((target, region))
+    for target, some in scattered.items():
+        union = hull(regions[some])[None]
+        if len(some) > 1 and near(union, targets[[target]], limits.distance, limits.size_ratio).alike.any():
+            edges += [(target, part) for part in some]
     return edges
 
 
@@ -221,7 +209,8 @@ def _gains(whole: Float, parts: Boxes, other: Float, gain: float, least: float) 
 
 def _knotted(taken: Index, edges: list[tuple[int, int]]) -> Matched:
     """Connected components of the pairs and edges."""
-    pairs = np.stack([taken, np.arange(len(taken))], axis=1)[taken >= 0]
+    matched = np.flatnonzero(taken >= 0)
+    pairs = np.array([taken[matched], matched]).T
     knots: list[Knot] = []
     if edges:
         group: dict[tuple[str, int], set[tuple[str, int]]] = {}
