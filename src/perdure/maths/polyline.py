@@ -6,7 +6,7 @@ that a path takes the same room however long it is (Brémond & Thonnat, IV.A).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,7 +80,7 @@ def motion(lines: Polylines, tolerance: ArrayLike, shortest: float, horizon: flo
     """
     from perdure.maths.kernels.paths import motion as kernel  # numba: half a second that no import should cost
 
-    limits = np.ascontiguousarray(np.broadcast_to(np.asarray(tolerance, np.float64), len(lines)))
+    limits = np.full(len(lines), tolerance, np.float64)
     return kernel(lines.knots, lines.last, lines.sums, limits, float(shortest), float(horizon))
 
 
@@ -107,10 +107,10 @@ def extend(
     from perdure.maths.kernels.paths import extend as kernel  # numba: half a second that no import should cost
 
     places = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 2))
-    limits = np.ascontiguousarray(np.broadcast_to(np.asarray(tolerance, np.float64), len(places)))
+    limits = np.full(len(places), tolerance, np.float64)
     knots, last, sums = lines.knots.copy(), lines.last.copy(), lines.sums.copy()
     kernel(knots, last, sums, np.asarray(rows, np.intp), float(time), places, limits, float(longest))
-    return replace(lines, knots=knots, last=last, sums=sums)
+    return Polylines(knots, last, sums)
 
 
 def exchanged(lines: Polylines, one: int, other: int) -> Polylines:

@@ -43,9 +43,9 @@ Identify = Callable[[Meeting, Compound, int], tuple[Meeting, int]]
 
 def company(targets: Targets, region: Index) -> NDArray[np.int64]:
     """Return how many targets (N,) that are not temporary share each one's region; 0 without a region."""
-    bodies = (region >= 0) & ~targets.temporary
-    counts = np.bincount(region[bodies], minlength=int(region.max(initial=-1)) + 2)
-    return np.asarray(np.where(bodies, counts[region], 0), np.int64)
+    from perdure.maths.kernels.counts import sharing
+
+    return sharing(region, ~targets.temporary)
 
 
 def form(
@@ -109,7 +109,7 @@ def _bound(meeting: Meeting, crowded: Index, frame: Frame) -> Meeting:
             known[keys[0]] = replace(known[keys[0]], kind="mixed")
         column[np.isin(column, keys)] = keys[0]
         column[rows] = keys[0]
-    targets = replace(meeting.targets, compound=column)
+    targets = meeting.targets.replace(compound=column)
     return replace(
         meeting, targets=targets, compounds=tuple(known.values()), next_key=next_key, events=tuple(events)
     )
@@ -132,7 +132,7 @@ def _with_temporaries(meeting: Meeting, ambiguous: NDArray[np.bool_], frame: Fra
             new.append((int(number), int(targets.compound[rows[0]])))
         used.add(key)
         within[rows] = key
-    targets = replace(targets, within=within)
+    targets = targets.replace(within=within)
     targets = _ended(targets, targets.temporary & ~np.isin(targets.keys, list(used)))
     if new:
         numbers, owners = (np.array(column) for column in zip(*new, strict=True))

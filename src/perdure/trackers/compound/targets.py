@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,7 +84,13 @@ class Targets:
             column = getattr(self, name).copy()
             column[rows] = value
             changed[name] = column
-        return replace(self, **changed)
+        return self.replace(**changed)
+
+    def replace(self, **columns: Any) -> Targets:
+        """Return targets with whole columns in the place of others; `dataclasses.replace` would set every one anew."""
+        changed = object.__new__(Targets)
+        changed.__dict__.update(self.__dict__, **columns)
+        return changed
 
 
 _ARRAYS = tuple(one.name for one in fields(Targets) if one.name != "lines")
@@ -127,7 +134,8 @@ def generic_points(boxes: Boxes) -> Float:
 
 def around(centre: Float, size: Float) -> Boxes:
     """Return boxes (N, 4) of a size (N, 2) round centres (N, 2)."""
-    return np.asarray(np.concatenate([centre - size / 2, centre + size / 2], axis=1), np.float32)
+    half = size / 2
+    return np.asarray(np.concatenate([centre - half, centre + half], axis=1), np.float32)
 
 
 def motions(targets: Targets) -> Float:
@@ -138,12 +146,12 @@ def motions(targets: Targets) -> Float:
 def extended(targets: Targets, rows: Index, time: float, centre: Float, size: Float) -> Targets:
     """Return targets whose trajectories, on some rows, have one location (K, 2) more."""
     lines = polyline.extend(targets.lines, rows, time, centre, TOLERANCE * extent(size), _LONGEST)
-    return replace(targets, lines=lines)
+    return targets.replace(lines=lines)
 
 
 def extent(size: Float) -> NDArray[np.float64]:
     """Return the side (N,) of the square as large as a box of a size (N, 2)."""
-    return np.asarray(np.sqrt(size.prod(axis=1, dtype=np.float64)), np.float64)
+    return np.asarray(np.sqrt(np.multiply(size[:, 0], size[:, 1], dtype=np.float64)), np.float64)
 
 
 def predicted(targets: Targets, motion: Float, time: float, patience: float) -> Boxes:
