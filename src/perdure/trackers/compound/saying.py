@@ -28,6 +28,7 @@ class Moment(NamedTuple):
     region: Index  # (N,) of each target; -1 for none
     held: Held
     expected: Boxes  # (N, 4) where each should be
+    silhouettes: bool  # whether regions have masks
     size: tuple[int, int]  # height, width of the picture
 
 
@@ -48,12 +49,8 @@ def say(targets: Targets, next_id: int, unsaid: Tracks, moment: Moment, confirm:
     spoken, rows = _rows(targets, group, moment, patience)
     said, late = rows, Tracks.empty()
     events: list[Event] = []
-    known = np.isin(unsaid.ids, targets.keys[targets.ids > 0])
-    if known.any():
-        order = np.argsort(targets.keys)
-        late = unsaid.take(known)
-        late = late.replace(ids=targets.ids[order][np.searchsorted(targets.keys[order], late.ids)])
-        unsaid = unsaid.take(~known)
+    if len(unsaid):
+        late, unsaid = _late(targets, unsaid)
     if named.any():
         things = np.flatnonzero(named & ~targets.temporary).tolist()
         begins = zip(targets.first[things].tolist(), targets.ids[things].tolist(), strict=True)
@@ -63,7 +60,17 @@ def say(targets: Targets, next_id: int, unsaid: Tracks, moment: Moment, confirm:
         unsaid = unsaid.take(np.isin(unsaid.ids, targets.keys[targets.ids == 0]))
         unsaid = Tracks.join([unsaid, rows.replace(ids=targets.keys[spoken]).take(mute)])
         said = rows.take(~mute)
-    return Said(targets, next_id + int(named.sum()), unsaid, Tracks.join([late, said]), tuple(events))
+    return Said(targets, next_id + int(np.count_nonzero(named)), unsaid, Tracks.join([late, said]), tuple(events))
+
+
+def _late(targets: Targets, unsaid: Tracks) -> tuple[Tracks, Tracks]:
+    """The rows of those that have a name by now, and the others'."""
+    known = np.isin(unsaid.ids, targets.keys[targets.ids > 0])
+    if not known.any():
+        return Tracks.empty(), unsaid
+    order, late = np.argsort(targets.keys), unsaid.take(known)
+    late = late.replace(ids=targets.ids[order][np.searchsorted(targets.keys[order], late.ids)])
+    return late, unsaid.take(~known)
 
 
 def is_group(targets: Targets) -> NDArray[np.bool_]:
@@ -78,11 +85,12 @@ def _named(
     targets: Targets, next_id: int, group: NDArray[np.bool_], moment: Moment, confirm: float
 ) -> tuple[Targets, NDArray[np.bool_]]:
     """Give ids, in the order of the rows."""
-    lasted = moment.frame.time - targets.born >= confirm - 1e-9
-    named = (targets.ids == 0) & (moment.region >= 0) & np.where(targets.temporary, group, lasted)
-    if not named.any():
-        return targets, named
-    return targets.with_(named, ids=next_id + np.arange(int(named.sum()))), named
+    named = (targets.ids == 0) & (moment.region >= 0)
+    if named.any():
+        lasted = moment.frame.time - targets.born >= confirm - 1e-9
+        named &= np.where(targets.temporary, group, lasted)
+        targets = targets.with_(named, ids=next_id + np.arange(int(named.sum())))
+    return targets, named
 
 
 def _spoken(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: float) -> Index:
@@ -101,10 +109,8 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
     own = np.flatnonzero(seen & ~shared)
     boxes[own] = _of_own(targets, rows[own], region[own], boxes[own], moment)
     status = np.where(seen, targets.hidden[rows] > 0, int(Status.LOST))  # VISIBLE 0, PARTLY_OCCLUDED 1
-    sure = np.append(regions.scores, 0.0)[region]
-    if not seen.all():
-        hope = np.clip(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0, 1.0)
-        sure = np.where(seen, sure, hope)
+    sure = np.maximum(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0)
+    sure[seen] = regions.scores[region[seen]]
     inferred = ~seen
     if shared.any():
         share = np.append(held.share, np.ones(len(targets) - len(held.share), np.float32))[rows]
@@ -113,13 +119,15 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
         sure = np.where(shared, np.where(clear, share, np.minimum(share, _UNSEEN)), sure)
         inferred = inferred | (shared & (share < HIDDEN))
     masks = _masks(rows, region, shared, group, moment)
-    told = group & (moment.region >= 0)
-    names = dict(zip(targets.keys[told].tolist(), targets.ids[told].tolist(), strict=True))
+    names = {}
+    if group.any():
+        told = group & (moment.region >= 0)
+        names = dict(zip(targets.keys[told].tolist(), targets.ids[told].tolist(), strict=True))
     return rows, Tracks.of(
         frames=moment.frame.index,
         times=moment.frame.time,
         ids=targets.ids[rows],
-        boxes=holding(boxes.astype(np.float32), masks) if any(mask.bits.size for mask in masks) else boxes,
+        boxes=holding(boxes.astype(np.float32), masks) if moment.silhouettes else boxes,
         status=status,
         confidence=sure,
         classes=targets.classes[rows],
@@ -127,11 +135,17 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
         inferred=inferred,
         masks=masks,
         hidden_side=side_words(targets.hidden[rows]) if targets.hidden.any() else "",
-        links=[
-            (one, *held.pieces.get(row, ())) if one >= 0 else ()
-            for row, one in zip(rows.tolist(), region.tolist(), strict=True)
-        ],
+        links=_links(rows, region, held),
     )
+
+
+def _links(rows: Index, region: Index, held: Held) -> list[tuple[int, ...]]:
+    """The regions that each row rests on, pieces included."""
+    links: list[tuple[int, ...]] = [(one,) if one >= 0 else () for one in region.tolist()]
+    if held.pieces:
+        for place, row in enumerate(rows.tolist()):
+            links[place] += held.pieces.get(row, ()) if links[place] else ()
+    return links
 
 
 def _of_own(targets: Targets, rows: Index, region: Index, boxes: Boxes, moment: Moment) -> Boxes:
@@ -139,10 +153,10 @@ def _of_own(targets: Targets, rows: Index, region: Index, boxes: Boxes, moment: 
 
     A group is where its region is; of a partly hidden target the believed box stands.
     """
-    seen = moment.regions.boxes[region]
-    for place, row in enumerate(rows.tolist()):
-        if row in moment.held.pieces:
-            seen[place] = hull(moment.regions.boxes[[int(region[place]), *moment.held.pieces[row]]])
+    seen, pieces = moment.regions.boxes[region], moment.held.pieces
+    for place, row in enumerate(rows.tolist() if pieces else ()):
+        if row in pieces:
+            seen[place] = hull(moment.regions.boxes[[int(region[place]), *pieces[row]]])
     weight = np.where(targets.temporary[rows], 1.0, np.where(targets.hidden[rows] > 0, 0.0, 0.5))[:, None]
     return np.asarray(boxes + weight * (seen - boxes), np.float32)
 
@@ -151,10 +165,9 @@ def _masks(
     rows: Index, region: Index, shared: NDArray[np.bool_], group: NDArray[np.bool_], moment: Moment
 ) -> tuple[Mask, ...]:
     """The pixels seen of each: its regions', or its own part of a common one; none of a group."""
-    known = moment.regions.masks
-    if not any(mask.bits.size for mask in known):
+    if not moment.silhouettes:
         return (Mask.empty(),) * len(rows)
-    found = []
+    known, found = moment.regions.masks, []
     for row, number, common, several in zip(
         rows.tolist(), region.tolist(), shared.tolist(), group[rows].tolist(), strict=True
     ):
@@ -171,21 +184,23 @@ def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]
     """Return what has happened to single targets: partly occluded, hidden by others, suspended, found again."""
     frame, region = moment.frame, moment.region
     count = len(before)
-    same = np.flatnonzero(
-        (targets.keys[:count] == before.keys) & (targets.ids[:count] > 0) & ~targets.temporary[:count]
-    )
+    same = (targets.keys[:count] == before.keys) & (targets.ids[:count] > 0) & ~targets.temporary[:count]
+    missed = targets.missed[:count]
+    partly, unseen = _crossed(before.partly, targets.partly[:count]), _crossed(before.missed, missed)
+    back = (before.missed >= _TOLD) & (missed == 0)
+    if not (same & (partly | unseen | back)).any():
+        return []
     shared = company(targets, region) > 1
     events = []
-    for row in same[_crossed(before.partly[same], targets.partly[same])].tolist():
+    for row in np.flatnonzero(same & partly).tolist():
         side = side_words(targets.hidden[[row]])[0]
         why = f"the {side} does not match, the opposite side does"
         events.append(_event("partly_occluded", targets, row, float(targets.partly[row]), frame, why))
-    for row in same[_crossed(before.missed[same], targets.missed[same])].tolist():
+    for row in np.flatnonzero(same & unseen).tolist():
         kind = "occluded" if shared[row] else "suspended"
         why = "hidden by the others in its region" if shared[row] else "no region where it should be"
         events.append(_event(kind, targets, row, float(targets.missed[row]), frame, why))
-    back = (before.missed[same] >= _TOLD) & (targets.missed[same] == 0)
-    for row in same[back].tolist():
+    for row in np.flatnonzero(same & back).tolist():
         why = f"where its trajectory led, after {before.missed[row]:.1f} s"
         events.append(Event("found_again", frame.index, frame.index, (int(targets.ids[row]),), why=why))
     return events
@@ -193,7 +208,7 @@ def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]
 
 def _crossed(before: NDArray[np.float64], now: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Where a time has just reached what is worth telling."""
-    return (before < _TOLD) & (now >= _TOLD) & np.isfinite(now)
+    return (before < _TOLD) & (now >= _TOLD) & (now < np.inf)
 
 
 def _event(kind: str, targets: Targets, row: int, lasted: float, frame: Frame, why: str) -> Event:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +109,8 @@ class Compound:
         targets, time = state.targets, frame.time
         motion = motions(targets)
         expected = predicted(targets, motion, time, self.patience)
-        held = self._gathered(state, expected, frame, regions)
+        blobs = _are_silhouettes(regions)
+        held = self._gathered(state, expected, frame, regions, blobs)
         meeting = form(targets, state.compounds, state.next_key, held, motion, frame, regions)
         judge = Judge(frame, regions, state.pairs, self.colour)
         meeting = resolve(meeting, frame, regions, self.apart, self.settle, judge)
@@ -124,13 +125,12 @@ class Compound:
         waited = 0.0 if regions.blind else time - state.time
         targets = _waited(targets, region, held, waited, frame.index)
         bodies = state.bodies
-        if _are_silhouettes(regions):  # a detector's boxes hold whole bodies as they are
+        if blobs:  # a detector's boxes hold whole bodies as they are
             bodies = learn(bodies, targets, region, time - state.time, state.size, _BODIES)
         targets, found = self._recalled(targets, region, held, frame, regions, state.size)
         region, unsaid = found.region, _rekeyed(state.unsaid, found.keys)
         company = accompany(state.pairs, targets, region, frame, regions.blind)
-        where = np.concatenate([expected, targets.boxes[len(expected) :]])
-        moment = Moment(frame, regions, region, held, where, state.size)
+        moment = Moment(frame, regions, region, held, _expected(expected, targets), blobs, state.size)
         said = say(targets, state.next_id, unsaid, moment, self.confirm, self.patience)
         told = happenings(state.targets, said.targets, moment)
         kept, gone = self._retired(said.targets, region, frame, state.size, regions.blind)
@@ -150,14 +150,15 @@ class Compound:
         out = np.flatnonzero(unseen & leaving(targets, motions(targets), state.size))
         return Report(events=tuple(_gone(targets, out, int(targets.latest.max(initial=0)), state.size)))
 
-    def _gathered(self, state: CompoundState, expected: Boxes, frame: Frame, regions: Regions) -> Held:
+    def _gathered(
+        self, state: CompoundState, expected: Boxes, frame: Frame, regions: Regions, blobs: bool
+    ) -> Held:
         """Who is in which region; hidden members of compounds are looked for too, where they would have come out."""
         targets = state.targets
         lately = np.where(targets.frozen, targets.missed > 0, targets.missed <= self.patience + 1e-9)
         active = np.flatnonzero(lately)
         unseen = np.minimum(targets.missed / max(self.patience, 1e-6), 1.0)
         cost = np.where(targets.ids == 0, _UNNAMED, 0.0) + _UNSEEN * unseen
-        blobs = _are_silhouettes(regions)
         limits = Thresholds(
             self.max_distance,
             self.max_size_ratio,
@@ -213,11 +214,12 @@ class Compound:
                 ~targets.frozen & leaving(targets, motions(targets), size), self.patience + 1e-9, limit
             )
         unnamed = ~targets.temporary & (targets.ids == 0)
-        kept = np.where(unnamed, ((region >= 0) | blind) & np.isfinite(targets.missed), targets.missed <= limit)
-        kept |= targets.temporary & blind & np.isfinite(targets.missed)
-        events = _gone(targets, np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary), frame.index, size)
+        kept = np.where(unnamed, (region >= 0) | blind, targets.missed <= limit)
+        kept = (kept | targets.temporary & blind) & np.isfinite(targets.missed)
+        events: list[Event] = []
         if not kept.all():
-            targets = targets.take(kept)
+            gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
+            events, targets = _gone(targets, gone, frame.index, size), targets.take(kept)
         if not targets.compound.any():
             return targets, events
         orphans = targets.frozen & ~np.isin(targets.within, targets.keys[targets.temporary])
@@ -257,13 +259,17 @@ def _gone(targets: Targets, rows: NDArray[np.intp], index: int, size: tuple[int,
     ]
 
 
+def _expected(expected: Boxes, targets: Targets) -> Boxes:
+    """Where each target should be; of new ones, behind the others, where they are."""
+    return np.concatenate([expected, targets.boxes[len(expected) :]]) if len(targets) > len(expected) else expected
+
+
 def _waited(targets: Targets, region: NDArray[np.intp], held: Held, waited: float, index: int) -> Targets:
     """Targets with the time for which each was not seen; who shows too little of herself is not."""
-    known = np.arange(len(targets)) < len(held.share)
-    hidden = known & (np.append(held.share, 0.0)[np.minimum(np.arange(len(targets)), len(held.share))] < HIDDEN)
+    hidden = np.zeros(len(targets), np.bool_)
+    hidden[: len(held.share)] = held.share < HIDDEN
     seen = (region >= 0) & (targets.temporary | ~hidden)
-    return replace(
-        targets,
+    return targets.replace(
         missed=np.where(seen & np.isfinite(targets.missed), 0.0, targets.missed + waited),
         latest=np.where(seen, index, targets.latest),
     )

@@ -75,8 +75,8 @@ def update(
 
 def _own_boxes(rows: Index, region: Index, held: Held, regions: Regions) -> Boxes:
     """The box (K, 4) of each target's region, pieces included."""
-    boxes = regions.boxes[region[rows]].copy()
-    for place, row in enumerate(rows.tolist()):
+    boxes = regions.boxes[region[rows]]
+    for place, row in enumerate(rows.tolist() if held.pieces else ()):
         if row in held.pieces:
             boxes[place] = hull(regions.boxes[[int(region[row]), *held.pieces[row]]])
     return boxes
@@ -157,7 +157,8 @@ def unclaimed(targets: Targets, region: Index, held: Held, regions: Regions, lea
     """Return the regions that found a new target: nobody's, of a sufficient score, and no piece of a visible target."""
     claimed = np.zeros(len(regions), np.bool_)
     claimed[region[region >= 0]] = True
-    claimed[[number for numbers in held.pieces.values() for number in numbers]] = True
+    for numbers in held.pieces.values():
+        claimed[list(numbers)] = True
     new = np.flatnonzero(~claimed & (regions.scores >= least))
     seen = region >= 0
     if not len(new) or not seen.any() or not any(regions.masks[number].bits.size for number in new):
