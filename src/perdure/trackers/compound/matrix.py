@@ -62,7 +62,7 @@ class Near(NamedTuple):
 
 
 def near(regions: Boxes, targets: Boxes, farthest: float, size_ratio: float) -> Near:
-    """Return the entries of the matrix with distances below `farthest`, and which are of similar size.
+    """Return the entries of the matrix with distances below `farthest`, and which are of similar size (IV.B).
 
     An entry of similar size is a correspondence. The thresholds are large on purpose. A region that is one piece of a
     target, or a target that is one member of a merged region, fails the test of size against the whole; `match` finds
@@ -103,12 +103,12 @@ def match(
     weak = (scores >= limits.least) & ~sure
     entries = near(regions, targets, limits.distance, limits.size_ratio)
     allowed = entries.alike | whole[entries.target]
-    worth = entries._replace(distance=entries.distance + cost[entries.target])
+    worth = entries.distance + cost[entries.target]
     taken = np.full(len(regions), -1, np.intp)  # target of each region
-    _one_to_one(taken, worth, allowed & sure[entries.region], limits.distance + 1)
+    _one_to_one(taken, entries, worth, allowed & sure[entries.region], limits.distance + 1)
     if weak.any():
         late = allowed & weak[entries.region] & (entries.distance < limits.second_distance)
-        _one_to_one(taken, worth, late & ~np.isin(entries.target, taken[taken >= 0]), limits.distance + 1)
+        _one_to_one(taken, entries, worth, late & ~np.isin(entries.target, taken[taken >= 0]), limits.distance + 1)
     edges = [
         *_merges(regions, targets, taken, limits),
         *_splits(regions, sure, targets, whole, taken, limits),
@@ -116,7 +116,7 @@ def match(
     return _knotted(taken, edges)
 
 
-def _one_to_one(taken: Index, entries: Near, allowed: NDArray[np.bool_], limit: float) -> None:
+def _one_to_one(taken: Index, entries: Near, cost: Float, allowed: NDArray[np.bool_], limit: float) -> None:
     """Note in `taken` the target of each region: least sum, where a pair costs less than leaving both alone."""
     from perdure.maths.kernels.counts import uncontested
 
@@ -129,27 +129,33 @@ def _one_to_one(taken: Index, entries: Near, allowed: NDArray[np.bool_], limit: 
         return
     from scipy.optimize import linear_sum_assignment  # half a second to load; most scenes begin without a choice
 
-    rows, row = np.unique(region[~plain], return_inverse=True)
-    columns, column = np.unique(target[~plain], return_inverse=True)
+    rows, row = _distinct(region[~plain])
+    columns, column = _distinct(target[~plain])
     part = np.full((len(rows), len(columns)), limit)
-    part[row, column] = entries.distance[allowed][~plain]
+    part[row, column] = cost[allowed][~plain]
     first, second = linear_sum_assignment(part)
     kept = part[first, second] < limit
     taken[rows[first[kept]]] = columns[second[kept]]
+
+
+def _distinct(numbers: Index) -> tuple[Index, Index]:
+    """The distinct ones of small numbers (K,), in order, and the place of each among them (K,)."""
+    distinct = np.bincount(numbers).nonzero()[0]
+    return distinct, np.searchsorted(distinct, numbers)
 
 
 def _merges(regions: Boxes, targets: Boxes, taken: Index, limits: Thresholds) -> list[tuple[int, int]]:
     """Edges (target, region): targets left over that explain a region better together with its own."""
     left = np.ones(len(targets), np.bool_)
     left[taken[taken >= 0]] = False
-    free = np.flatnonzero(left)
+    free = left.nonzero()[0]
     if not len(free) or not len(regions):
         return []
     from perdure.maths.kernels.overlaps import shares
 
     inside = shares(targets[free], regions)  # (F, R)
     edges = []
-    for region in np.flatnonzero((inside >= limits.share).any(axis=0)):
+    for region in np.flatnonzero((inside >= limits.share).any(axis=0)).tolist():
         part = inside[:, region]  # (F,)
         members = [int(taken[region])] if taken[region] >= 0 else []
         others = free[np.argsort(-part, kind="stable")][: int((part >= limits.share).sum())]
@@ -158,7 +164,7 @@ def _merges(regions: Boxes, targets: Boxes, taken: Index, limits: Thresholds) ->
                 continue
             members.append(other)
         if len(members) > 1:
-            edges += [(member, int(region)) for member in members if member != taken[region]]
+            edges += [(member, region) for member in members if member != taken[region]]
     return edges
 
 
@@ -171,7 +177,7 @@ def _splits(
     limits: Thresholds,
 ) -> list[tuple[int, int]]:
     """Edges (target, region): regions left over that fit a target better together with its own."""
-    free = np.flatnonzero((taken < 0) & sure)
+    free = ((taken < 0) & sure).nonzero()[0]
     if not len(free) or not len(targets):
         return []
     from perdure.maths.kernels.overlaps import shares
@@ -209,7 +215,7 @@ def _gains(whole: Float, parts: Boxes, other: Float, gain: float, least: float) 
 
 def _knotted(taken: Index, edges: list[tuple[int, int]]) -> Matched:
     """Connected components of the pairs and edges."""
-    matched = np.flatnonzero(taken >= 0)
+    matched = (taken >= 0).nonzero()[0]
     pairs = np.array([taken[matched], matched]).T
     knots: list[Knot] = []
     if edges:

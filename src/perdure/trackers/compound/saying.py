@@ -11,7 +11,7 @@ from perdure.features.boxes import hull
 from perdure.features.masks import disjoint, holding, union
 from perdure.trackers.compound.gathering import HIDDEN, Held
 from perdure.trackers.compound.meetings import company
-from perdure.trackers.compound.targets import Targets, side_words
+from perdure.trackers.compound.targets import CENTRE, Targets, around, side_words
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Status, Tracks
 
 Index = NDArray[np.intp]
@@ -47,30 +47,25 @@ def say(targets: Targets, next_id: int, unsaid: Tracks, moment: Moment, confirm:
     group = is_group(targets)
     targets, named = _named(targets, next_id, group, moment, confirm)
     spoken, rows = _rows(targets, group, moment, patience)
-    said, late = rows, Tracks.empty()
-    events: list[Event] = []
-    if len(unsaid):
-        late, unsaid = _late(targets, unsaid)
-    if named.any():
-        things = np.flatnonzero(named & ~targets.temporary).tolist()
-        begins = zip(targets.first[things].tolist(), targets.ids[things].tolist(), strict=True)
-        events = [Event("entered", begin, begin, (one,)) for begin, one in begins]
+    late, unsaid = _late(targets, unsaid)
+    things = named[~targets.temporary[named]]
+    begins = zip(targets.first[things].tolist(), targets.ids[things].tolist(), strict=True)
+    events = tuple(Event("entered", begin, begin, (one,)) for begin, one in begins)
     mute = rows.ids == 0
-    if mute.any() or len(unsaid):
-        unsaid = unsaid.take(np.isin(unsaid.ids, targets.keys[targets.ids == 0]))
-        unsaid = Tracks.join([unsaid, rows.replace(ids=targets.keys[spoken]).take(mute)])
-        said = rows.take(~mute)
-    return Said(targets, next_id + int(np.count_nonzero(named)), unsaid, Tracks.join([late, said]), tuple(events))
+    if mute.any():
+        unsaid = Tracks.join([unsaid, rows.take(mute).replace(ids=targets.keys[spoken[mute]])])
+        rows = rows.take(~mute)
+    return Said(targets, next_id + len(named), unsaid, Tracks.join([late, rows]), events)
 
 
 def _late(targets: Targets, unsaid: Tracks) -> tuple[Tracks, Tracks]:
-    """The rows of those that have a name by now, and the others'."""
-    known = np.isin(unsaid.ids, targets.keys[targets.ids > 0])
-    if not known.any():
-        return Tracks.empty(), unsaid
-    order, late = np.argsort(targets.keys), unsaid.take(known)
-    late = late.replace(ids=targets.ids[order][np.searchsorted(targets.keys[order], late.ids)])
-    return late, unsaid.take(~known)
+    """The rows of those that have a name by now, and of those that still have none; nobody else's."""
+    if not len(unsaid):
+        return unsaid, unsaid
+    names = dict(zip(targets.keys.tolist(), targets.ids.tolist(), strict=True))
+    found = np.array([names.get(key, -1) for key in unsaid.ids.tolist()])
+    late = unsaid.take(found > 0).replace(ids=found[found > 0])
+    return late, Tracks.join([unsaid.take(found == 0)])
 
 
 def is_group(targets: Targets) -> NDArray[np.bool_]:
@@ -83,20 +78,20 @@ def is_group(targets: Targets) -> NDArray[np.bool_]:
 
 def _named(
     targets: Targets, next_id: int, group: NDArray[np.bool_], moment: Moment, confirm: float
-) -> tuple[Targets, NDArray[np.bool_]]:
-    """Give ids, in the order of the rows."""
-    named = (targets.ids == 0) & (moment.region >= 0)
-    if named.any():
-        lasted = moment.frame.time - targets.born >= confirm - 1e-9
-        named &= np.where(targets.temporary, group, lasted)
-        targets = targets.with_(named, ids=next_id + np.arange(int(named.sum())))
+) -> tuple[Targets, Index]:
+    """Give ids, in the order of the rows; return who has got one."""
+    named = ((targets.ids == 0) & (moment.region >= 0)).nonzero()[0]
+    if len(named):
+        lasted = moment.frame.time - targets.born[named] >= confirm - 1e-9
+        named = named[np.where(targets.temporary[named], group[named], lasted)]
+        targets = targets.with_(named, ids=next_id + np.arange(len(named)))
     return targets, named
 
 
 def _spoken(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: float) -> Index:
     """The rows of targets that are spoken of: all but temporary ones without a company, and those long unseen."""
     lately = (moment.region >= 0) | (targets.missed <= patience + 1e-9)
-    return np.flatnonzero(lately & (~targets.temporary | group))
+    return (lately & (group | ~targets.temporary)).nonzero()[0]
 
 
 def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: float) -> tuple[Index, Tracks]:
@@ -105,9 +100,8 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
     region, regions, held = moment.region[rows], moment.regions, moment.held
     seen = region >= 0
     shared = company(targets, moment.region)[rows] > 1
-    boxes = np.where(seen[:, None], targets.boxes[rows], moment.expected[rows])
-    own = np.flatnonzero(seen & ~shared)
-    boxes[own] = _of_own(targets, rows[own], region[own], boxes[own], moment)
+    boxes = moment.expected[rows]
+    boxes[seen] = _seen_boxes(targets, rows[seen], region[seen], shared[seen], moment)
     status = np.where(seen, targets.hidden[rows] > 0, int(Status.LOST))  # VISIBLE 0, PARTLY_OCCLUDED 1
     sure = np.maximum(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0)
     sure[seen] = regions.scores[region[seen]]
@@ -148,17 +142,20 @@ def _links(rows: Index, region: Index, held: Held) -> list[tuple[int, ...]]:
     return links
 
 
-def _of_own(targets: Targets, rows: Index, region: Index, boxes: Boxes, moment: Moment) -> Boxes:
-    """The boxes (K, 4) said of targets with a region of their own: between what is believed and what is seen.
+def _seen_boxes(targets: Targets, rows: Index, region: Index, shared: NDArray[np.bool_], moment: Moment) -> Boxes:
+    """The boxes (K, 4) said of targets that have a region: between what is believed and what is seen.
 
-    A group is where its region is; of a partly hidden target the believed box stands.
+    A group is where its region is; of a partly hidden target, and of one that shares its region, the believed box
+    stands.
     """
     seen, pieces = moment.regions.boxes[region], moment.held.pieces
     for place, row in enumerate(rows.tolist() if pieces else ()):
         if row in pieces:
             seen[place] = hull(moment.regions.boxes[[int(region[place]), *pieces[row]]])
-    weight = np.where(targets.temporary[rows], 1.0, np.where(targets.hidden[rows] > 0, 0.0, 0.5))[:, None]
-    return np.asarray(boxes + weight * (seen - boxes), np.float32)
+    believed = around(targets.points[rows, CENTRE], targets.size[rows])
+    stands = shared | (targets.hidden[rows] > 0)
+    weight = np.where(targets.temporary[rows], 1.0, np.where(stands, 0.0, 0.5))[:, None]
+    return np.asarray(believed + weight * (seen - believed), np.float32)
 
 
 def _masks(
@@ -186,8 +183,8 @@ def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]
     count = len(before)
     same = (targets.keys[:count] == before.keys) & (targets.ids[:count] > 0) & ~targets.temporary[:count]
     missed = targets.missed[:count]
-    partly, unseen = _crossed(before.partly, targets.partly[:count]), _crossed(before.missed, missed)
-    back = (before.missed >= _TOLD) & (missed == 0)
+    away, partly = before.missed >= _TOLD, (before.partly < _TOLD) & (targets.partly[:count] >= _TOLD)
+    unseen, back = ~away & (missed >= _TOLD) & np.isfinite(missed), away & (missed == 0)
     if not (same & (partly | unseen | back)).any():
         return []
     shared = company(targets, region) > 1
@@ -204,11 +201,6 @@ def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]
         why = f"where its trajectory led, after {before.missed[row]:.1f} s"
         events.append(Event("found_again", frame.index, frame.index, (int(targets.ids[row]),), why=why))
     return events
-
-
-def _crossed(before: NDArray[np.float64], now: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where a time has just reached what is worth telling."""
-    return (before < _TOLD) & (now >= _TOLD) & (now < np.inf)
 
 
 def _event(kind: str, targets: Targets, row: int, lasted: float, frame: Frame, why: str) -> Event:

@@ -156,7 +156,7 @@ class Compound:
         """Who is in which region; hidden members of compounds are looked for too, where they would have come out."""
         targets = state.targets
         lately = np.where(targets.frozen, targets.missed > 0, targets.missed <= self.patience + 1e-9)
-        active = np.flatnonzero(lately)
+        active = lately.nonzero()[0]
         unseen = np.minimum(targets.missed / max(self.patience, 1e-6), 1.0)
         cost = np.where(targets.ids == 0, _UNNAMED, 0.0) + _UNSEEN * unseen
         limits = Thresholds(
@@ -214,8 +214,10 @@ class Compound:
                 ~targets.frozen & leaving(targets, motions(targets), size), self.patience + 1e-9, limit
             )
         unnamed = ~targets.temporary & (targets.ids == 0)
-        kept = np.where(unnamed, (region >= 0) | blind, targets.missed <= limit)
-        kept = (kept | targets.temporary & blind) & np.isfinite(targets.missed)
+        kept = np.where(unnamed, region >= 0, targets.missed <= limit)
+        if blind:
+            kept |= unnamed | targets.temporary
+        kept &= np.isfinite(targets.missed)
         events: list[Event] = []
         if not kept.all():
             gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)

@@ -54,17 +54,15 @@ def update(
     inertia : float
         Seconds over which the mean size is averaged.
     """
-    together = company(targets, region)
-    known = np.arange(len(targets)) < len(held.region)
-    single = np.flatnonzero((together == 1) & known)
-    shared = np.flatnonzero((together > 1) & known)
+    together = company(targets, region)[: len(held.region)]
+    single, shared = (together == 1).nonzero()[0], (together > 1).nonzero()[0]
     if len(single):
         boxes = _own_boxes(single, region, held, regions)
         start = np.where(targets.frozen[single][:, None], held.boxes[single], expected[single])
         targets = _visible(targets, single, start, boxes, region[single], regions, (time, size), partial, inertia)
     if len(shared):
         targets = _believed(targets, shared, held, time)
-    temporary = np.flatnonzero((region >= 0) & targets.temporary & (targets.lines.last[:, 0] < time))
+    temporary = ((region >= 0) & targets.temporary & (targets.lines.last[:, 0] < time)).nonzero()[0]
     if len(temporary):
         boxes = regions.boxes[region[temporary]]
         whole = np.maximum(sizes(boxes), 1.0)
@@ -159,7 +157,7 @@ def unclaimed(targets: Targets, region: Index, held: Held, regions: Regions, lea
     claimed[region[region >= 0]] = True
     for numbers in held.pieces.values():
         claimed[list(numbers)] = True
-    new = np.flatnonzero(~claimed & (regions.scores >= least))
+    new = (~claimed & (regions.scores >= least)).nonzero()[0]
     seen = region >= 0
     if not len(new) or not seen.any() or not any(regions.masks[number].bits.size for number in new):
         return new
