@@ -181,23 +181,25 @@ def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]
     """Return what has happened to single targets: partly occluded, hidden by others, suspended, found again."""
     frame, region = moment.frame, moment.region
     count = len(before)
-    same = (targets.keys[:count] == before.keys) & (targets.ids[:count] > 0) & ~targets.temporary[:count]
-    missed = targets.missed[:count]
-    away, partly = before.missed >= _TOLD, (before.partly < _TOLD) & (targets.partly[:count] >= _TOLD)
-    unseen, back = ~away & (missed >= _TOLD) & np.isfinite(missed), away & (missed == 0)
-    if not (same & (partly | unseen | back)).any():
+    partly, missed = targets.partly[:count] >= _TOLD, targets.missed[:count] >= _TOLD
+    away = before.missed >= _TOLD
+    if not (partly | missed | away).any():
         return []
+    same = (targets.keys[:count] == before.keys) & (targets.ids[:count] > 0) & ~targets.temporary[:count]
+    partly &= same & (before.partly < _TOLD)
+    unseen = same & ~away & missed & np.isfinite(targets.missed[:count])
+    back = same & away & (targets.missed[:count] == 0)
     shared = company(targets, region) > 1
     events = []
-    for row in np.flatnonzero(same & partly).tolist():
+    for row in np.flatnonzero(partly).tolist():
         side = side_words(targets.hidden[[row]])[0]
         why = f"the {side} does not match, the opposite side does"
         events.append(_event("partly_occluded", targets, row, float(targets.partly[row]), frame, why))
-    for row in np.flatnonzero(same & unseen).tolist():
+    for row in np.flatnonzero(unseen).tolist():
         kind = "occluded" if shared[row] else "suspended"
         why = "hidden by the others in its region" if shared[row] else "no region where it should be"
         events.append(_event(kind, targets, row, float(targets.missed[row]), frame, why))
-    for row in np.flatnonzero(same & back).tolist():
+    for row in np.flatnonzero(back).tolist():
         why = f"where its trajectory led, after {before.missed[row]:.1f} s"
         events.append(Event("found_again", frame.index, frame.index, (int(targets.ids[row]),), why=why))
     return events

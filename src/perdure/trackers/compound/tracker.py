@@ -207,6 +207,20 @@ class Compound:
         self, targets: Targets, region: NDArray[np.intp], frame: Frame, size: tuple[int, int], blind: bool
     ) -> tuple[Targets, list[Event]]:
         """Let go of who was not seen for long (IV.D), and of unnamed ones at the first miss."""
+        doubtful = (targets.missed > min(self.patience, self.longest)) | (targets.ids == 0)
+        events: list[Event] = []
+        if doubtful.any() and not (kept := self._kept(targets, region, frame, size, blind)).all():
+            gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
+            events, targets = _gone(targets, gone, frame.index, size), targets.take(kept)
+        if not targets.compound.any():
+            return targets, events
+        orphans = targets.frozen & ~np.isin(targets.within, targets.keys[targets.temporary])
+        return targets.with_(orphans, compound=0, within=0) if orphans.any() else targets, events
+
+    def _kept(
+        self, targets: Targets, region: NDArray[np.intp], frame: Frame, size: tuple[int, int], blind: bool
+    ) -> NDArray[np.bool_]:
+        """Which targets (N,) are not let go of."""
         remembered = self.recall if frame.image is not None and self.colour else self.patience
         limit = np.where(targets.frozen, self.longest, max(remembered, self.patience)) + 1e-9
         if (targets.missed > self.patience).any():  # who was going out over the border will not be found again
@@ -217,15 +231,7 @@ class Compound:
         kept = np.where(unnamed, region >= 0, targets.missed <= limit)
         if blind:
             kept |= unnamed | targets.temporary
-        kept &= np.isfinite(targets.missed)
-        events: list[Event] = []
-        if not kept.all():
-            gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
-            events, targets = _gone(targets, gone, frame.index, size), targets.take(kept)
-        if not targets.compound.any():
-            return targets, events
-        orphans = targets.frozen & ~np.isin(targets.within, targets.keys[targets.temporary])
-        return targets.with_(orphans, compound=0, within=0) if orphans.any() else targets, events
+        return np.asarray(kept & np.isfinite(targets.missed))
 
 
 _SECOND = 0.5  # distance up to which a region of low score may be a target
