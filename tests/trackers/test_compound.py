@@ -631,6 +631,46 @@ def test_who_is_wholly_hidden_by_another_for_ever_is_let_go():
     assert said.tracks.in_frame(65).ids.tolist() == [2]
 
 
+# ---- boxes that jitter -------------------------------------------------------------------------------------------
+
+
+def shaken(seen: Seen, by: float) -> Seen:
+    """The same boxes, each off by about so many px."""
+    rng = np.random.default_rng(0)
+    return [
+        (f, Regions.of((r.boxes + np.tile(rng.normal(0, by, (len(r), 2)), 2)).astype(np.float32))) for f, r in seen
+    ]
+
+
+def trust(seen: Seen, world: World) -> float:
+    """The gain at the end of a film."""
+    tracker = Compound()
+    state = tracker.start(world.scene)
+    for frame, regions in seen:
+        state, _ = tracker.step(state, frame, regions)
+    return float(state.jitter.gain.mean())
+
+
+def strollers(count: int = 135) -> World:
+    return street(*(person(along((0, 10, y), (count, 10 + 2 * count, y))) for y in (20, 90, 160)), count=count)
+
+
+def test_boxes_that_jitter_are_trusted_less_than_boxes_that_do_not():
+    world = strollers()
+    still, little, much = (trust(shaken(boxes_alone(world.seen()), by), world) for by in (0.0, 1.0, 4.0))
+    assert still > 0.7 > 0.55 > much
+    assert still > little >= much
+
+
+def test_two_side_by_side_keep_their_names_though_their_boxes_jitter_by_a_sixth_of_their_width():
+    world = street(
+        person(along((0, 10, 100), (120, 250, 100))), person(along((0, 38, 100), (120, 278, 100))), count=120
+    )
+    tracks = story(world, shaken(boxes_alone(world.seen()), 4.0)).tracks
+    told = [names(tracks, world, k) for k in range(120)]
+    assert sum(one in ([1, 2], [0, 2], [1, 0]) for one in told) >= 118
+
+
 # ---- points and trajectories: points 2 to 5 ---------------------------------------------------------------------
 
 

@@ -49,6 +49,7 @@ class Targets:
     scores: Float  # (N,) of its last region
     classes: NDArray[np.str_]  # (N,) of its last region
     hidden: NDArray[np.int8]  # (N,) bits of the hidden sides, in the order of SIDES
+    surprise: NDArray[np.float64]  # (N, 2) where last seen, off where it was going, sizes; NaN if not by itself
     looks: Float  # (N, *GRID, 4) mean colour and share seen of every cell of the box
     first: NDArray[np.int64]  # (N,) the frame in which it was first seen
     latest: NDArray[np.int64]  # (N,) the last frame in which it had a region
@@ -121,6 +122,7 @@ def newborn(frame: Frame, boxes: Boxes, scores: Float, classes: NDArray[np.str_]
         scores=np.asarray(scores, np.float32),
         classes=np.asarray(classes, np.str_),
         hidden=np.zeros(count, np.int8),
+        surprise=np.full((count, 2), np.nan),
         looks=np.zeros((count, *GRID, 4), np.float32),
         first=np.full(count, frame.index, np.int64),
         latest=np.full(count, frame.index, np.int64),

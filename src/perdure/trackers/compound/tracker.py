@@ -13,6 +13,8 @@ from perdure.trackers.compound.bodies import Bodies
 from perdure.trackers.compound.companies import Pair, accompany
 from perdure.trackers.compound.gathering import HIDDEN, Held, Sight, gather
 from perdure.trackers.compound.identity import Judge
+from perdure.trackers.compound.jitter import Jitter
+from perdure.trackers.compound.jitter import learnt as surprised
 from perdure.trackers.compound.matrix import Thresholds, match
 from perdure.trackers.compound.meetings import Compound as Record
 from perdure.trackers.compound.meetings import form, resolve
@@ -23,7 +25,8 @@ from perdure.trackers.compound.updating import learn, looked, unclaimed, update
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Tracks
 
 _UNNAMED = 0.2  # distance that a target without a name is put behind others
-_UNSEEN = 0.2  # the same of one not seen for `patience` seconds
+_UNSEEN = 0.2  # the same of one not seen for `patience` seconds, where regions are silhouettes
+_JITTER = 2.5  # and where they are boxes, times what boxes jitter by: so much may one lie off that is hers
 _PART = 0.5  # share of a region in a target, or a target in a region, that makes one part of the other
 
 
@@ -36,6 +39,7 @@ class CompoundState:
     compounds: tuple[Record, ...]
     pairs: tuple[Pair, ...]  # who is with whom
     bodies: Bodies
+    jitter: Jitter
     next_key: int
     next_id: int
     time: float  # s, of the last frame
@@ -101,7 +105,16 @@ class Compound:
             Frame(0, 0.0), np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.str_), 1
         )
         return CompoundState(
-            nobody, Tracks.empty(), (), (), Bodies.unknown(), 1, 1, 0.0, (scene.height, scene.width)
+            nobody,
+            Tracks.empty(),
+            (),
+            (),
+            Bodies.unknown(),
+            Jitter.unknown(),
+            1,
+            1,
+            0.0,
+            (scene.height, scene.width),
         )
 
     def step(self, state: CompoundState, frame: Frame, regions: Regions) -> tuple[CompoundState, Report]:
@@ -115,8 +128,18 @@ class Compound:
         judge = Judge(frame, regions, state.pairs, self.colour)
         meeting = resolve(meeting, frame, regions, self.apart, self.settle, judge)
         targets = update(
-            meeting.targets, meeting.region, held, expected, regions, time, state.size, self.partial, self.inertia
+            meeting.targets,
+            meeting.region,
+            held,
+            expected,
+            regions,
+            time,
+            state.size,
+            self.partial,
+            self.inertia,
+            np.ones(2) if blobs else state.jitter.gain,  # silhouettes do not jitter
         )
+        jitter = surprised(state.jitter, meeting.targets.surprise, targets.surprise)
         births = unclaimed(targets, meeting.region, held, regions, self.birth_score)
         if len(births):
             scores, classes = regions.scores[births], regions.classes[births]
@@ -138,7 +161,7 @@ class Compound:
         compounds = tuple(one for one in meeting.compounds if one.key in live)
         key = meeting.next_key + len(births)
         state = CompoundState(
-            kept, said.unsaid, compounds, company.pairs, bodies, key, said.next_id, time, state.size
+            kept, said.unsaid, compounds, company.pairs, bodies, jitter, key, said.next_id, time, state.size
         )
         events = (*said.events, *company.events, *meeting.events, *found.events, *told, *gone)
         return state, Report(said.rows, renamed=(*meeting.renamed, *found.renamed), events=events)
@@ -158,7 +181,8 @@ class Compound:
         lately = np.where(targets.frozen, targets.missed > 0, targets.missed <= self.patience + 1e-9)
         active = lately.nonzero()[0]
         unseen = np.minimum(targets.missed / max(self.patience, 1e-6), 1.0)
-        cost = np.where(targets.ids == 0, _UNNAMED, 0.0) + _UNSEEN * unseen
+        behind = _UNSEEN if blobs else _JITTER * state.jitter.spread
+        cost = np.where(targets.ids == 0, _UNNAMED, 0.0) + behind * unseen
         limits = Thresholds(
             self.max_distance,
             self.max_size_ratio,

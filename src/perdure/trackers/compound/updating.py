@@ -10,7 +10,7 @@ from perdure.features.boxes import areas, centres, hull, intersections, sizes
 from perdure.trackers.compound.bodies import Bodies, learnt
 from perdure.trackers.compound.gathering import HIDDEN, Held
 from perdure.trackers.compound.meetings import company
-from perdure.trackers.compound.targets import CENTRE, Targets, extended, generic_points
+from perdure.trackers.compound.targets import CENTRE, Targets, extended, extent, generic_points
 from perdure.types import Boxes, Image, Regions
 
 Index = NDArray[np.intp]
@@ -30,6 +30,7 @@ def update(
     size: tuple[int, int],
     partial: float,
     inertia: float,
+    gain: NDArray[np.float64],
 ) -> Targets:
     """Bring all targets that have a region up to date.
 
@@ -53,13 +54,17 @@ def update(
         Mismatch of a point, target sizes, that signals a partial occlusion.
     inertia : float
         Seconds over which the mean size is averaged.
+    gain : (2,)
+        Share of the way from where a target was expected to where it is seen, in x and y, that its trajectory goes.
     """
+    targets = targets.replace(surprise=np.full((len(targets), 2), np.nan))
     together = company(targets, region)[: len(held.region)]
     single, shared = (together == 1).nonzero()[0], (together > 1).nonzero()[0]
     if len(single):
         boxes = _own_boxes(single, region, held, regions)
         start = np.where(targets.frozen[single][:, None], held.boxes[single], expected[single])
-        targets = _visible(targets, single, start, boxes, region[single], regions, (time, size), partial, inertia)
+        moment = (time, size)
+        targets = _visible(targets, single, start, boxes, region[single], regions, moment, partial, inertia, gain)
     if len(shared):
         targets = _believed(targets, shared, held, time)
     temporary = ((region >= 0) & targets.temporary & (targets.lines.last[:, 0] < time)).nonzero()[0]
@@ -90,6 +95,7 @@ def _visible(
     moment: tuple[float, tuple[int, int]],
     partial: float,
     inertia: float,
+    gain: NDArray[np.float64],
 ) -> Targets:
     """Locate targets (K,), expected at boxes (K, 4), by their regions' boxes; extend trajectories, average sizes."""
     from perdure.maths.kernels.follow import follow
@@ -99,7 +105,10 @@ def _visible(
     pace = np.minimum(1.0, np.maximum(1.0 / (targets.hits[rows] + 1), elapsed / max(inertia, 1e-6)))
     entering, picture = time - targets.born[rows] < _ENTERING, np.array([width, height], np.float32)
     points, hidden, size = follow(expected, boxes, entering, pace.astype(np.float32), picture, partial)
-    targets = extended(targets, rows, time, points[:, CENTRE], size)
+    off = points[:, CENTRE] - centres(expected)
+    surprise = (off - (targets.points[rows, CENTRE] - targets.lines.last[rows, 1:])) / extent(size)[:, None]
+    surprise[(targets.missed[rows] > 0) | targets.frozen[rows]] = np.nan
+    targets = extended(targets, rows, time, (centres(expected) + gain * off).astype(np.float32), size)
     return targets.with_(
         rows,
         points=points,
@@ -107,6 +116,7 @@ def _visible(
         seen=time,
         hits=targets.hits[rows] + 1,
         hidden=hidden,
+        surprise=surprise,
         partly=np.where(hidden > 0, targets.partly[rows] + elapsed, 0.0),
         scores=regions.scores[region],
         classes=regions.classes[region],
