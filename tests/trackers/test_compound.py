@@ -614,7 +614,7 @@ def test_the_state_stays_as_it_is_while_two_stand_together_for_ever():
         state, report = tracker.step(state, Frame(k, k / 10, frame.image), regions)
         if k % 50 == 49:
             sizes.append((len(state.targets), len(state.pairs), len(state.compounds)))
-            assert len(states.save(state)) < 30_000
+            assert len(states.save(state)) < 150_000
     assert set(sizes) == {(3, 1, 1)}
     assert report.rows.take(~report.rows.is_group).ids.tolist() == [1, 2]
 
@@ -629,6 +629,53 @@ def test_who_is_wholly_hidden_by_another_for_ever_is_let_go():
     (lost,) = said.told("lost")
     assert 18 <= lost[1] <= 22, "from the first frame without her"
     assert said.tracks.in_frame(65).ids.tolist() == [2]
+
+
+# ---- two who come in together ------------------------------------------------------------------------------------
+
+
+def side_by_side(part: int) -> World:
+    """Two who come in from the left hand in hand, as one region, and part in a frame."""
+    return street(
+        person(along((0, -40, 100), (part, 130, 100), (part + 15, 130, 40))),
+        person(along((0, -18, 100), (part, 152, 100), (part + 15, 152, 160)), BLUE),
+        count=part + 16,
+    )
+
+
+def test_two_who_came_in_as_one_region_are_both_said_from_then_on_once_they_part():
+    world = side_by_side(34)
+    told = story(world)
+    (mended,) = [one for one in told.events if one.kind == "mended"]
+    assert mended.ids == (1, 2)
+    assert mended.begin <= 9
+    assert mended.end == 40
+    told_then = [k for k in range(12, 50) if sorted(names(told.tracks, world, k)) == [1, 2]]
+    assert set(told_then) >= {*range(12, 41), *range(45, 50)}  # the newcomer is believed in after .25 s
+    for k in range(12, 41):
+        left, right = told.tracks.in_frame(k).masks
+        assert min(left.area, right.area) > 0.6 * 24 * 48
+
+
+def test_who_was_alone_before_another_came_out_from_behind_her_was_alone():
+    world = street(
+        bar(150, 182, 60, 240),
+        person(along((0, 10, 100), (30, 158, 100), (60, 158, 100))),
+        person(along((20, 154, 100), (30, 160, 100), (50, 230, 100)), BLUE),
+        count=60,
+    )
+    before = story(world).tracks.in_frame(10)
+    assert len(before) == 1
+
+
+def test_a_bag_that_is_left_behind_was_nobody_before():
+    world = street(
+        person(along((0, 10, 100), (60, 250, 100))),
+        Block(lambda k: (min(10 + 4 * k, 130) + 2, 138), (10, 10), BLUE),
+        count=60,
+    )
+    told = story(world)
+    assert not told.told("mended")
 
 
 # ---- boxes that jitter -------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from perdure.trackers.compound.jitter import learnt as surprised
 from perdure.trackers.compound.matrix import Thresholds, match
 from perdure.trackers.compound.meetings import Compound as Record
 from perdure.trackers.compound.meetings import form, resolve
+from perdure.trackers.compound.mending import Mended, mend, remember
 from perdure.trackers.compound.recalling import Found, leaving, recall
 from perdure.trackers.compound.saying import Moment, happenings, say
 from perdure.trackers.compound.targets import Float, Targets, motions, newborn, predicted
@@ -36,6 +37,7 @@ class CompoundState:
 
     targets: Targets
     unsaid: Tracks  # rows of targets without a name; their ids are the targets' keys
+    early: Tracks  # regions of young targets since each came in; their ids are the targets' keys
     compounds: tuple[Record, ...]
     pairs: tuple[Pair, ...]  # who is with whom
     bodies: Bodies
@@ -107,6 +109,7 @@ class Compound:
         return CompoundState(
             nobody,
             Tracks.empty(),
+            Tracks.empty(),
             (),
             (),
             Bodies.unknown(),
@@ -155,16 +158,22 @@ class Compound:
         company = accompany(state.pairs, targets, region, frame, regions.blind)
         moment = Moment(frame, regions, region, held, _expected(expected, targets), blobs, state.size)
         said = say(targets, state.next_id, unsaid, moment, self.confirm, self.patience)
-        told = happenings(state.targets, said.targets, moment)
-        kept, gone = self._retired(said.targets, region, frame, state.size, regions.blind)
+        early, mended = state.early, Mended(said.targets, Tracks.empty(), (), ())
+        if blobs:
+            early = remember(early, said.targets, region, held, (frame, regions), bodies, self.longest)
+            newly = np.flatnonzero((said.targets.ids >= state.next_id) & ~said.targets.temporary)
+            mended = mend(early, said.targets, newly, bodies, state.size)
+        told = happenings(state.targets, mended.targets, moment)
+        kept, gone = self._retired(mended.targets, region, frame, state.size, regions.blind)
         live = set(kept.compound.tolist())
         compounds = tuple(one for one in meeting.compounds if one.key in live)
         key = meeting.next_key + len(births)
         state = CompoundState(
-            kept, said.unsaid, compounds, company.pairs, bodies, jitter, key, said.next_id, time, state.size
+            kept, said.unsaid, early, compounds, company.pairs, bodies, jitter, key, said.next_id, time, state.size
         )
-        events = (*said.events, *company.events, *meeting.events, *found.events, *told, *gone)
-        return state, Report(said.rows, renamed=(*meeting.renamed, *found.renamed), events=events)
+        rows = Tracks.join([mended.rows, said.rows])
+        events = (*said.events, *mended.events, *company.events, *meeting.events, *found.events, *told, *gone)
+        return state, Report(rows, (*meeting.renamed, *found.renamed), mended.dropped, events)
 
     def finish(self, state: CompoundState) -> Report:
         """Return what is left to say: who had left when the film ended."""
