@@ -25,12 +25,10 @@ Float = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 Single = NDArray[np.float32]
 
-_WINDOW = 15  # pixels across that Lucas-Kanade compares
-_LEVELS, _SMALL = (
-    3,
-    60,
-)  # halvings of the picture at most, and pixels a side that it keeps: of less, windows see all
-_STEPS, _CLOSE = 20, 0.03  # iterations of Lucas-Kanade at most; px below which it stops
+_WINDOW = 11  # pixels across that Lucas-Kanade compares
+_LEVELS = 3  # halvings of the picture at most: motions up to some 60 px a frame are found
+_SMALL = 45  # pixels a side that halving leaves at least: in less, a window sees several things at once
+_STEPS, _CLOSE = 10, 0.03  # iterations of Lucas-Kanade at most; px below which it stops
 _STRONG = 0.99  # quantile of contrast; one black corner must not silence the rest of the picture
 _NOISE = 2.0  # squared grey levels a pixel: what noise alone has for contrast
 _ASTRAY = 1.0  # pixels by which there and back may differ
@@ -111,7 +109,7 @@ def sparse(
 
 
 def dense(
-    previous: Grey, current: Grey, *, preset: Literal["fast", "medium"] = "medium", astray: float = _ASTRAY
+    previous: Grey, current: Grey, *, preset: Literal["fast", "medium"] = "fast", astray: float = _ASTRAY
 ) -> Flow:
     """Find the motion of every pixel (dense inverse search), valid where there and back agree.
 
