@@ -18,6 +18,7 @@ from perdure.detect import DETECTORS, Recorded
 from perdure.errors import DamagedVideo, FormatError, ParameterError
 from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
+from perdure.files.shapes import is_file
 from perdure.files.video import Source, open_source
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
@@ -216,14 +217,6 @@ def detector_name(detector: str | Path | None) -> str:
         raise FormatError(f"{detector}: there is no such file of detections")
     known = [name for name in DETECTORS if name != "recorded"]
     raise ParameterError(f"{params.unknown_name('detector', str(detector), known)}, or name a file of detections")
-
-
-def is_file(word: str | Path) -> bool:
-    """Return whether a word names a file that is there; a polygon or an address may be too long for a name."""
-    try:
-        return Path(str(word)).is_file()
-    except (OSError, ValueError):  # too long, or not a path at all
-        return False
 
 
 class Split(NamedTuple):

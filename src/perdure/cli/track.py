@@ -23,8 +23,9 @@ from perdure.detect import DETECTORS
 from perdure.errors import OutputError
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
+from perdure.files.shapes import is_file
 from perdure.fold import Step
-from perdure.pipeline import Plan, is_file, plan
+from perdure.pipeline import Plan, plan
 from perdure.trackers import TRACKERS
 
 _FAMILIES = (("tracker", TRACKERS), ("detector", DETECTORS), ("", {"What counts": Reporting}))

@@ -6,7 +6,6 @@ A pixel is inside when its centre is: the polygon '0,0 4,0 4,4 0,4' is the box '
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,15 +14,10 @@ import numpy as np
 
 from perdure.errors import FormatError, ParameterError, VideoError
 from perdure.files.lines import why_not_json
+from perdure.files.shapes import Ring, filled, is_file, is_polygon, place, read_ring, read_shape
 from perdure.files.span import shown
 from perdure.types import Bits
 
-Ring = list[tuple[float, float]]
-
-_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
-_BOX = re.compile(rf"\s*{_NUMBER}(?:\s*,\s*{_NUMBER}){{3}}\s*")
-_POLYGON = re.compile(rf"\s*{_NUMBER},{_NUMBER}(?:\s+{_NUMBER},{_NUMBER}){{2,}}\s*")
-_FARTHEST = 10**6  # px
 _FORMS = "an image or a file of polygons, a box 'x,y,w,h', or a polygon 'x,y x,y x,y'"
 
 
@@ -64,30 +58,12 @@ def read_roi(text_or_path: str | Path, width: int, height: int) -> Bits:
 
 def _read(text: str, width: int, height: int) -> Bits:
     """The region that a text is or names; ValueError for a coordinate too far out."""
-    if _BOX.fullmatch(text):
-        return _box(text, width, height)
-    if _POLYGON.fullmatch(text):
-        return _filled([[_ring(text)]], width, height)
-    if _is_file(text):
+    drawn = read_shape(text, width, height)
+    if drawn is not None:
+        return drawn
+    if is_file(text):
         return _read_file(Path(text), width, height)
     raise ParameterError(f"roi = {shown(text)} is no file and no region: give {_FORMS}")
-
-
-def _is_file(text: str) -> bool:
-    try:
-        return Path(text).is_file()
-    except OSError:  # no file can have this name
-        return False
-
-
-def _box(text: str, width: int, height: int) -> Bits:
-    """The pixels whose centre is in the half-open box."""
-    x, y, w, h = (_place(float(one)) for one in text.split(","))
-    columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
-    across, down = (columns >= x) & (columns < x + w), (rows >= y) & (rows < y + h)
-    inside = np.zeros((height, width), np.bool_)
-    inside[np.ix_(down, across)] = True
-    return inside
 
 
 def _read_file(path: Path, width: int, height: int) -> Bits:
@@ -101,8 +77,8 @@ def _read_file(path: Path, width: int, height: int) -> Bits:
     if "\0" in text:
         return _read_image(path, width, height)
     if text.lstrip().startswith(("{", "[")):
-        return _filled(list(_read_json(path, text)), width, height)
-    return _filled(list(_read_lines(path, text)), width, height)
+        return filled(list(_read_json(path, text)), width, height)
+    return filled(list(_read_lines(path, text)), width, height)
 
 
 def _read_image(path: Path, width: int, height: int) -> Bits:
@@ -123,11 +99,11 @@ def _read_lines(path: Path, text: str) -> Iterator[list[Ring]]:
         bare = line.split("#")[0].strip()
         if not bare:
             continue
-        if not _POLYGON.fullmatch(bare):
+        if not is_polygon(bare):
             raise FormatError(f"{path}, line {number}: not a polygon 'x,y x,y x,y': {shown(line.strip())}")
         found = True
         try:
-            yield [_ring(bare)]
+            yield [read_ring(bare)]
         except ValueError as error:
             raise FormatError(f"{path}, line {number}: {error}") from None
     if not found:
@@ -178,31 +154,4 @@ def _points(ring: Any) -> Ring:
         raise TypeError
     if not {type(one) for point in ring for one in point[:2]} <= {int, float}:
         raise TypeError
-    return [(_place(point[0]), _place(point[1])) for point in ring]
-
-
-def _ring(text: str) -> Ring:
-    pairs = (one.split(",") for one in text.split())
-    return [(_place(float(x)), _place(float(y))) for x, y in pairs]
-
-
-def _place(number: float) -> float:
-    if not abs(number) <= _FARTHEST:
-        raise ValueError(f"a coordinate must lie in -{_FARTHEST} to {_FARTHEST} pixels")
-    return float(number)
-
-
-def _filled(polygons: list[list[Ring]], width: int, height: int) -> Bits:
-    """The pixels whose centre is inside any polygon: crossed an odd number of times by a ray to the left."""
-    inside = np.zeros((height, width), np.bool_)
-    columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
-    for polygon in polygons:
-        odd = np.zeros((height, width), np.bool_)
-        for ring in polygon:
-            for (x1, y1), (x2, y2) in zip(ring, [*ring[1:], ring[0]], strict=True):
-                across = np.flatnonzero((rows >= min(y1, y2)) & (rows < max(y1, y2)))
-                if across.size:
-                    x = x1 + (rows[across] - y1) * (x2 - x1) / (y2 - y1)  # where each row meets the edge
-                    odd[across] ^= columns[None] >= x[:, None]
-        inside |= odd
-    return inside
+    return [(place(point[0]), place(point[1])) for point in ring]
