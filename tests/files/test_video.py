@@ -214,6 +214,7 @@ def test_a_start_is_included_and_an_end_is_not(
     source = open_source(film(tmp_path / "a.mp4"), start=start, end=end)
     assert numbers(source) == list(wanted)
     assert source.count == len(wanted)
+    assert source.wanted == wanted
 
 
 @pytest.mark.parametrize(

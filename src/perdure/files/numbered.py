@@ -50,13 +50,18 @@ class Numbered:
                 f"start ({self.span.start}) is beyond the end of {self.name}: it has {self.total} frames"
                 f" ({self.total / self.fps:.2f} s)"
             )
-        if self.total and not self._wanted:
+        if self.total and not self.wanted:
             raise ParameterError(no_frame(self.span))
 
     @property
     def count(self) -> int | None:
         """How many frames it will deliver."""
-        return len(self._wanted)
+        return len(self.wanted)
+
+    @property
+    def wanted(self) -> range:
+        """The numbers of the frames that it will deliver."""
+        return self.span.numbers(self.total, self.fps)
 
     def __iter__(self) -> Iterator[Frame]:
         frames = ahead(self._frames()) if self.has_images else self._frames()
@@ -65,7 +70,7 @@ class Numbered:
 
     def sample(self, count: int) -> list[Frame]:
         """Return about `count` frames spread evenly; those that cannot be read are left out."""
-        wanted = self._wanted
+        wanted = self.wanted
         places = np.unique(np.linspace(0, len(wanted) - 1, max(0, min(count, len(wanted)))).round().astype(int))
         frames = []
         for place in places:
@@ -88,12 +93,8 @@ class Numbered:
         for frames in list(self.running):
             frames.close()
 
-    @property
-    def _wanted(self) -> range:
-        return self.span.numbers(self.total, self.fps)
-
     def _frames(self) -> Generator[Frame, None, None]:
-        for index in self._wanted:
+        for index in self.wanted:
             yield self._frame(index)
 
     def _frame(self, index: int) -> Frame:

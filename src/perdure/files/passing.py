@@ -53,6 +53,7 @@ class Passing:
     threaded: bool
     count: int | None = None
     rereadable: bool = False
+    wanted: range | None = None
     has_images: bool = True
     folder: Path | None = None
     running: weakref.WeakSet[Generator[Frame, None, None]] = field(default_factory=weakref.WeakSet, repr=False)

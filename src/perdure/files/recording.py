@@ -49,6 +49,12 @@ class Recording:
     folder: Path | None = None
     running: weakref.WeakSet[Generator[Frame, None, None]] = field(default_factory=weakref.WeakSet, repr=False)
 
+    @property
+    def wanted(self) -> range | None:
+        """The numbers of the frames that it will deliver, by its packets; None where these tell nothing."""
+        known, wanted = self._known_and_wanted()
+        return wanted if known.stamps else None
+
     def __iter__(self) -> Iterator[Frame]:
         frames = ahead(self._frames())
         self.running.add(frames)
@@ -62,8 +68,7 @@ class Recording:
         """
         if count < 1:
             return []
-        known = self.listing or list_frames(self.path)
-        wanted = wanted_frames(self.span, known, self.fixed, self.first)
+        known, wanted = self._known_and_wanted()
         if not wanted:
             return []
         places = {wanted[i] for i in np.linspace(0, len(wanted) - 1, min(count, len(wanted))).round().astype(int)}
@@ -83,6 +88,11 @@ class Recording:
         """End what still reads from it."""
         for frames in list(self.running):
             frames.close()
+
+    def _known_and_wanted(self) -> tuple[Listing, range]:
+        """What the packets tell, and the numbers of the wanted frames by it."""
+        known = self.listing or list_frames(self.path)
+        return known, wanted_frames(self.span, known, self.fixed, self.first)
 
     def _frames(self) -> Generator[Frame, None, None]:
         """The wanted frames; DamagedVideo at the first damage, after every frame before it."""

@@ -58,6 +58,11 @@ class Source(Protocol):
         ...
 
     @property
+    def wanted(self) -> range | None:
+        """The numbers of the frames that it will deliver, where it can be known beforehand."""
+        ...
+
+    @property
     def rereadable(self) -> bool:
         """Whether iterating twice gives the same frames."""
         ...
