@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import typing
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from worlds import WORLDS, World, lone_walker, two_apart
 
 from perdure import params, states
-from perdure.detect import DETECTORS
+from perdure.detect import DETECTORS, Mark
 from perdure.errors import ParameterError
 from perdure.types import Frame, Mask, Regions, Report, Scene, Tracks
 
@@ -18,10 +19,27 @@ every_world = pytest.mark.parametrize("world", [make() for make in WORLDS.values
 
 
 def detector_for(kind, world: World):
-    """A detector that can work in this world: a recorded one gets the world's own regions."""
+    """A detector that can work in this world: a recorded one gets the world's own regions, a marked one marks of them."""
     if "regions" in kind.__dataclass_fields__:
         return kind(regions={frame.index: regions for frame, regions in world.seen()})
+    if "marks" in kind.__dataclass_fields__:
+        return kind(marks=tuple(marks(world)))
     return kind()
+
+
+def marks(world: World) -> list[Mark]:
+    """Silhouettes in every fourth frame, boxes around them in every fourth, nothing in the others."""
+    return [
+        Mark(
+            frame.index,
+            number,
+            mask if frame.index % 4 else replace(mask, bits=mask.bits | True),
+            frame.index % 4 == 0,
+        )
+        for frame, regions in world.seen()
+        if frame.index % 2 == 0
+        for number, mask in enumerate(regions.masks, 1)
+    ]
 
 
 def run(detector, frames, scene, state=None) -> tuple[object, list[Regions]]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from perdure.detect.background import Background
+from perdure.detect.marked import Mark, Marked
 from perdure.detect.recorded import Recorded
 
-__all__ = ["DETECTORS", "Background", "Recorded"]
+__all__ = ["DETECTORS", "Background", "Mark", "Marked", "Recorded"]
 
-DETECTORS: dict[str, type[Any]] = {"background": Background, "recorded": Recorded}
+DETECTORS: dict[str, type[Any]] = {"background": Background, "recorded": Recorded, "marked": Marked}

@@ -31,7 +31,7 @@ class Regions:
     masks : N of Mask
         Empty masks where the detector gives none.
     data : mapping of str to (N, ...) arrays
-        Whatever else the detector said; kept, never read.
+        Whatever else the detector said, kept; `mark` is the id that the user gave a thing, (N,) int64.
     events : tuple of Event
         What the detector noticed of the place: the light changed, a thing was left behind.
     blind : bool
