@@ -27,7 +27,7 @@ from perdure.types import Mask, Rows, Tracks, Use
 VOID = 255  # of an 8-bit truth
 LARGEST_ID = 65_535
 
-_Indices = NDArray[np.uint8] | NDArray[np.uint16]  # (H, W)
+Indices = NDArray[np.uint8] | NDArray[np.uint16]  # (H, W)
 
 
 def read_masks(folder: Path, *, void: bool = False) -> Rows:
@@ -56,12 +56,12 @@ def read_masks(folder: Path, *, void: bool = False) -> Rows:
     narrow: list[bool] = []
     size: tuple[int, int] | None = None
     for frame, path in pictures_in(folder):
-        picture = _read_indices(path)  # (H, W)
+        picture = read_indices(path)  # (H, W)
         height, width = picture.shape
         if size is not None and size != (height, width):
             raise FormatError(f"{path} is {width}x{height}, the first picture {size[1]}x{size[0]}")
         size = height, width
-        for identity, mask in _silhouettes(picture):
+        for identity, mask in silhouettes(picture):
             frames.append(frame)
             ids.append(identity)
             masks.append(mask)
@@ -184,8 +184,8 @@ def refuse_existing_folder(folder: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{folder} holds pictures already; add --overwrite or name another folder with -o")
 
 
-def _silhouettes(picture: _Indices) -> Iterator[tuple[int, Mask]]:
-    """The values of a picture but 0, ascending, each with its tight mask."""
+def silhouettes(picture: Indices) -> Iterator[tuple[int, Mask]]:
+    """Yield the values of an index picture but 0, ascending, each with its tight mask."""
     from scipy.ndimage import find_objects
 
     for value, place in enumerate(find_objects(picture), 1):
@@ -194,8 +194,8 @@ def _silhouettes(picture: _Indices) -> Iterator[tuple[int, Mask]]:
             yield value, Mask(rows.start, columns.start, picture[place] == value)
 
 
-def _read_indices(path: Path) -> _Indices:
-    """Read an index picture; FormatError for one that is none."""
+def read_indices(path: Path) -> Indices:
+    """Return an index picture (H, W); FormatError for a file that is none."""
     import cv2
 
     try:
@@ -211,7 +211,7 @@ def _read_indices(path: Path) -> _Indices:
         raise FormatError(f"{path} is damaged")
     if depth < 8:  # the decoder spreads few bits over eight
         picture = picture // (255 // ((1 << depth) - 1))
-    return cast("_Indices", picture)
+    return cast("Indices", picture)
 
 
 def _without_palette(encoded: bytes) -> tuple[int, bytes]:
@@ -255,7 +255,7 @@ def _chunks(encoded: bytes) -> Iterator[tuple[bytes, bytes]]:
         at += 12 + length
 
 
-def _paint(picture: _Indices, rows: Tracks) -> int:
+def _paint(picture: Indices, rows: Tracks) -> int:
     """Write the ids into a picture, the first row's last; return how many have a silhouette in it."""
     cut = [disjoint([mask], *picture.shape)[0] for mask in rows.masks]
     for identity, mask in zip(rows.ids[::-1], cut[::-1], strict=True):
@@ -264,7 +264,7 @@ def _paint(picture: _Indices, rows: Tracks) -> int:
     return sum(mask.bits.size > 0 for mask in cut)
 
 
-def _write_picture(folder: Path, frame: int, picture: _Indices) -> None:
+def _write_picture(folder: Path, frame: int, picture: Indices) -> None:
     import cv2
 
     (folder / f"{frame:06d}.png").write_bytes(cv2.imencode(".png", picture)[1].tobytes())
