@@ -44,6 +44,8 @@ class Tracker(Protocol[S]):
 
     `step` changes neither `frame` nor `regions` and depends on nothing else. The state passed in is
     consumed: its buffers may be reused; `perdure.states.save` gives an independent copy.
+    A tracker that goes on from what the user marked (`regions.data["mark"]`), with no detector after that frame, has
+    `follows_marks = True`.
     """
 
     needs_pixels: bool

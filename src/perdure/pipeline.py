@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure import fold, params
-from perdure.detect import DETECTORS, Recorded
+from perdure.detect import DETECTORS, Marked, Recorded
 from perdure.errors import DamagedVideo, FormatError, ParameterError
+from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
 from perdure.files.shapes import is_file
@@ -40,6 +41,7 @@ class Plan:
     tracker_name: str
     tracker: Any
     classes: tuple[str, ...]
+    init: tuple[str, ...] = ()  # what the user marked, in words
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -48,6 +50,8 @@ class Plan:
                 raise ParameterError(
                     f"{self.source.name} has no images and this {what} needs them; name a --detector FILE"
                 )
+        if self.classes and self.init:
+            raise ParameterError("what is marked has no class; leave out --class")
         if self.classes and self.detector_name == "background":
             raise ParameterError(
                 "the background detector names no classes; leave out --class or give --detector FILE"
@@ -61,7 +65,11 @@ class Plan:
         return dataclasses.replace(self, detector=looked)
 
     def notes(self) -> tuple[str, ...]:
-        """Return what the user should know about how source and detections went together."""
+        """Return what the user should know about how source, detections and tracker went together."""
+        if self.init and not follows_marks(self.tracker):
+            return (
+                f"the tracker {self.tracker_name} does not follow marks: it knows of each in its own frame only",
+            )
         if not isinstance(self.detector, Recorded) or not self.source.count:
             return ()
         frames, count = self.detector.regions.keys(), self.source.count
@@ -97,8 +105,9 @@ class Plan:
 def plan(
     source: AnySource,
     *,
-    tracker: str = "compound",
+    tracker: str | None = None,
     detector: str | Path | None = None,
+    init: AnyMark | Sequence[AnyMark] | None = None,
     fps: float | None = None,
     start: str | float | None = None,
     end: str | float | None = None,
@@ -113,11 +122,14 @@ def plan(
     ----------
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
-    tracker : str
-        A name of `perdure.trackers.TRACKERS`.
+    tracker : str or None
+        A name of `perdure.trackers.TRACKERS`; None for 'compound', or with `init` for the first that follows marks.
     detector : str, Path or None
         'background', or a file of regions (`.jsonl` of `perdure detect`, or MOTChallenge `.txt`);
         None for the background, or for `det/det.txt` of a MOTChallenge folder without images.
+    init : str, Path, (H, W) array of whole numbers, pair of one of these and its frame, or list of these
+        What the user marked, instead of a detector: an index PNG or array (the value is the id, 0 nothing), a box
+        'x,y,w,h' or a polygon 'x,y x,y x,y …', with '@FRAME' behind a text for another frame than 0.
     fps : float or None
         Frames per second, where the source has none or a wrong one.
     start, end : str, float or None
@@ -136,21 +148,31 @@ def plan(
     VideoError, FormatError, ParameterError
         The caller's mistake, in one line.
     """
+    words = () if init is None else words_of(init)
+    if words and detector is not None:
+        raise ParameterError(
+            f"--init and --detector {detector} do not go together yet: what is marked is followed without a "
+            "detector; leave one of them out"
+        )
+    tracker = _default_tracker(marked=bool(words)) if tracker is None else tracker
     if not isinstance(tracker, str) or tracker not in TRACKERS:
         raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
-    name = detector_name(detector)
+    name = "marked" if words else detector_name(detector)
     opened = open_source(source, fps=fps, start=start, end=end, stride=stride)
     try:
-        if detector is None and not opened.has_images:
+        if detector is None and not words and not opened.has_images:
             detector, name = _own_detections(opened), "recorded"
         of_tracker, of_detector = split(parameters or {}, tracker, name)
         made_tracker = params.build(TRACKERS[tracker], of_tracker)
         made_detector = params.build(DETECTORS[name], of_detector)
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
-        region = None if roi is None else read_roi(roi, opened.width, opened.height)
+        scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
+        if init is not None and words:
+            _refuse_late_start(opened, start)
+            made_detector = Marked(marks=read_marks(init, scene, opened.wanted))
         wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
-        made = Plan(opened, opened.scene(region), name, made_detector, tracker, made_tracker, wanted)
+        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words)
         made.check()
     except BaseException:
         opened.close()
@@ -169,7 +191,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, fps, start, end, stride, roi, classes; and parameters of the
+        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, classes; and parameters of the
         detector and the tracker by name.
 
     Raises
@@ -215,8 +237,26 @@ def detector_name(detector: str | Path | None) -> str:
         return "recorded"
     if Path(str(detector)).suffix in (".txt", ".jsonl", ".csv"):
         raise FormatError(f"{detector}: there is no such file of detections")
-    known = [name for name in DETECTORS if name != "recorded"]
+    known = [name for name in DETECTORS if name not in ("recorded", "marked")]
     raise ParameterError(f"{params.unknown_name('detector', str(detector), known)}, or name a file of detections")
+
+
+def follows_marks(tracker: object) -> bool:
+    """Return whether a tracker goes on from what the user marked, with no detector."""
+    return bool(getattr(tracker, "follows_marks", False))
+
+
+def _default_tracker(*, marked: bool) -> str:
+    """The tracker where none is named."""
+    return next((name for name, kind in TRACKERS.items() if marked and follows_marks(kind)), "compound")
+
+
+def _refuse_late_start(source: Source, start: str | float | None) -> None:
+    """Refuse marks in a source that passes once where its frame 0, the only one to mark, is left out."""
+    if source.wanted is None and start is not None:
+        raise ParameterError(
+            f"{source.name} passes only once: its frame 0 is the one to mark; leave out --start or --init"
+        )
 
 
 class Split(NamedTuple):
@@ -264,7 +304,9 @@ def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
     return {**own, "parameters": {**(own.get("parameters") or {}), **others}}
 
 
-_OPTIONS = frozenset(("tracker", "detector", "fps", "start", "end", "stride", "roi", "classes", "parameters"))
+_OPTIONS = frozenset(
+    ("tracker", "detector", "init", "fps", "start", "end", "stride", "roi", "classes", "parameters")
+)
 
 
 def _own_detections(source: Source) -> Path:

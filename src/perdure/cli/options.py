@@ -82,6 +82,17 @@ DetectorOption = Annotated[
     ),
 ]
 
+InitOption = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--init",
+        metavar="WHAT[@FRAME]",
+        help="Follow what is marked in a frame (from 0; default 0), with no detector: an index PNG (pixel value = "
+        "id, 0 = nothing), a box x,y,w,h, or a polygon 'x,y x,y …'; may be repeated.",
+        show_default=False,
+    ),
+]
+
 
 def with_parameters(*families: tuple[str, Mapping[str, type[Any]]]) -> Callable[[F], F]:
     """Give a command an option for each declared parameter; it gets those that were given as `chosen`.

@@ -41,8 +41,16 @@ def track(
             "-o", "--output", metavar="DIR", help="Run folder; default perdure-runs/NAME.", show_default=False
         ),
     ] = None,
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=f"One of: {', '.join(TRACKERS)}.")] = "compound",
+    tracker: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=f"One of: {', '.join(TRACKERS)}. Default: compound; with --init, the first that follows marks.",
+            show_default=False,
+        ),
+    ] = None,
     detector: options.DetectorOption = None,
+    init: options.InitOption = None,
     roi: options.RoiOption = None,
     class_: options.ClassOption = None,
     fps: options.FpsOption = None,
@@ -63,6 +71,7 @@ def track(
         source,
         tracker=tracker,
         detector=detector,
+        init=init,
         fps=fps,
         start=start,
         end=end,
@@ -222,6 +231,7 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "window": window,
         "classes": list(made.classes),
         "detector": {"name": made.detector_name, "parameters": params.values(made.detector)},
+        "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
         "reporting": params.values(reporting),
     }
