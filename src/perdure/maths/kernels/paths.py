@@ -49,11 +49,13 @@ def extend(
         off = np.hypot(x - x0 - across * (time - begin), y - y0 - down * (time - begin))
         if sums[row, N] > 1 and (off > tolerance[place] or time - begin > longest):
             for knot in range(knots.shape[1] - 1):
-                knots[row, knot] = knots[row, knot + 1]
+                for column in range(3):  # a row at once would take longer to compile than all the rest
+                    knots[row, knot, column] = knots[row, knot + 1, column]
             lasted = last[row, 0] - begin
             begin, x0, y0 = last[row, 0], x0 + across * lasted, y0 + down * lasted
             knots[row, -1, 0], knots[row, -1, 1], knots[row, -1, 2] = begin, x0, y0
-            sums[row] = 0.0
+            for column in range(5):
+                sums[row, column] = 0.0
         t, x, y = time - begin, x - x0, y - y0
         sums[row, N] += 1
         sums[row, TT] += t * t
