@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import changed, given, kernel, kernel_for
 
 OUTSIDE, WITHIN, UNKNOWN = 0, 1, 2  # of the silhouette; beyond the picture
 SWEEPS = 4
@@ -13,7 +13,18 @@ SWEEPS = 4
 Float = NDArray[np.float32]
 
 
-@kernel
+@kernel_for(
+    given(np.uint8, 2, "C"),
+    given(np.float32, 3, "C"),
+    given(np.float32, 4, "C"),
+    given(np.int64, 2),
+    given(np.int64, 2),
+    given(np.int64, 2),
+    float,
+    float,
+    float,
+    changed(np.float64),
+)
 def arrange(
     support: NDArray[np.uint8],
     picture: Float,

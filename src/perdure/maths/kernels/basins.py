@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import given, kernel, kernel_for
 
 
-@kernel
+@kernel_for(given(np.uint16, 2, "C"), given(np.int64), float, float, float, float)
 def basins(
     relief: NDArray[np.uint16],
     order: NDArray[np.int64],

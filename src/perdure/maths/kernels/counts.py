@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import given, kernel_for
 
 Index = NDArray[np.int64]
 
 
-@kernel
+@kernel_for(given(np.int64), given(np.bool_))
 def sharing(numbers: Index, counted: NDArray[np.bool_]) -> Index:
     """Return how many of those counted (N,) have each one's number; 0 of a number below 0 and of one not counted."""
     highest = -1
@@ -27,7 +27,7 @@ def sharing(numbers: Index, counted: NDArray[np.bool_]) -> Index:
     return found
 
 
-@kernel
+@kernel_for(given(np.int64), given(np.int64))
 def uncontested(rows: Index, columns: Index) -> NDArray[np.bool_]:
     """Return which entries (K,) of a matrix, each once, are alone in their row and in their column."""
     height, width = 0, 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import changed, kernel, kernel_for
 
 LEFT, RIGHT, ABOVE, BELOW = 1, 2, 4, 8
 BESIDE = LEFT | RIGHT
@@ -13,7 +13,7 @@ ALL_BUT_BELOW = BESIDE | ABOVE
 PARTLY = 254  # what is enclosed, but not on all four sides
 
 
-@kernel
+@kernel_for(changed(np.uint8, 2), changed(np.uint8, 2))
 def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
     """Turn doubtful pixels that sure ones enclose into sure ones, in place: 255 if on all four sides, else PARTLY.
 

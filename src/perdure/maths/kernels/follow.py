@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import given, kernel_for
 
 Float = NDArray[np.float32]
 Followed = tuple[Float, NDArray[np.int8], Float]
@@ -20,7 +20,9 @@ _SIDES = (3, 1, 4, 2)  # points of the left, top, right and bottom side, as the 
 _OPPOSITE = (4, 2, 3, 1)
 
 
-@kernel
+@kernel_for(
+    given(np.float32, 2), given(np.float32, 2), given(np.bool_), given(np.float32), given(np.float32), float
+)
 def follow(
     expected: Float, boxes: Float, entering: NDArray[np.bool_], pace: Float, picture: Float, partial: float
 ) -> Followed:

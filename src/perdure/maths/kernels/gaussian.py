@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import changed, given, kernel_for
 
 Single = NDArray[np.float32]
 
@@ -14,7 +14,21 @@ SHADOW_COLOUR = 0.25  # of the squared threshold: a shadow keeps the ground's co
 WEAK_SHARE = 0.25  # of the squared threshold: half as far from the mean as what is foreground
 
 
-@kernel
+@kernel_for(
+    given(np.uint8, 3, "C"),
+    given(np.float32),
+    changed(np.float32, 3),
+    changed(np.float32, 2),
+    given(np.uint8, 2, "C"),
+    changed(np.uint8, 2),
+    changed(np.uint8, 2),
+    np.float32,
+    np.float32,
+    np.float32,
+    np.float32,
+    np.float32,
+    np.float32,
+)
 def compare_and_learn(
     image: NDArray[np.uint8],
     exposure: Single,

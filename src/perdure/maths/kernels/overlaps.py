@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import given, kernel, kernel_for
 
 Float = NDArray[np.float32]
 Index = NDArray[np.int64]
@@ -13,7 +13,7 @@ Nearby = tuple[Index, Index, Float, NDArray[np.bool_]]
 _SPECK = 1e-6  # no side and no area is smaller, where they divide
 
 
-@kernel
+@kernel_for(given(np.float32, 2), given(np.float32, 2))
 def distances(one: Float, other: Float) -> Float:
     """Return the distances (N, M) of boxes (N, 4) from others (M, 4), in [0, inf).
 
@@ -32,7 +32,7 @@ def distances(one: Float, other: Float) -> Float:
     return found
 
 
-@kernel
+@kernel_for(given(np.float32, 2), given(np.float32, 2), float, float)
 def nearby(one: Float, other: Float, farthest: float, size_ratio: float) -> Nearby:
     """Return the pairs of boxes whose 1 - IoU is below `farthest`; boxes that do not touch are no pair.
 
@@ -72,7 +72,7 @@ def nearby(one: Float, other: Float, farthest: float, size_ratio: float) -> Near
     return np.array(rows), np.array(columns), np.array(distances), np.array(alike)
 
 
-@kernel
+@kernel_for(given(np.float32, 2), given(np.float32, 2))
 def shares(one: Float, other: Float) -> Float:
     """Return what share (N, M), in [0, 1], of each of some boxes (N, 4) lies in each of others (M, 4)."""
     found, least = np.empty((len(one), len(other)), np.float32), np.float32(_SPECK)

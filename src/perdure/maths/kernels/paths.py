@@ -5,14 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import changed, given, kernel_for
 from perdure.maths.polyline import Polylines, reliable, velocity
 
 Float = NDArray[np.float64]
 N, TT, TX, TY, RR = range(5)  # columns of `sums`
 
 
-@kernel
+@kernel_for(
+    changed(np.float64, 3),
+    changed(np.float64, 2),
+    changed(np.float64, 2),
+    given(np.intp),
+    float,
+    given(np.float64, 2),
+    given(np.float64),
+    float,
+)
 def extend(
     knots: Float,
     last: Float,
@@ -65,7 +74,7 @@ def extend(
         last[row, 0], last[row, 1], last[row, 2] = time, points[place, 0], points[place, 1]
 
 
-@kernel
+@kernel_for(given(np.float64, 3), given(np.float64, 2), given(np.float64, 2), given(np.float64), float, float)
 def motion(knots: Float, last: Float, sums: Float, tolerance: Float, shortest: float, horizon: float) -> Float:
     """Return motion vectors (N, 2), px/s: of the last segment if it is reliable, else of more of them.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import changed, given, kernel_for
 from perdure.maths.kernels.gaussian import DARKENED, MOVING
 
 Single = NDArray[np.float32]
@@ -15,7 +15,16 @@ LEAST_DARKENED = 8  # of these 25: fewer say nothing
 MOST_MOVING = 0.2  # of the darkened: among more of a thing's pixels it is the thing's
 
 
-@kernel
+@kernel_for(
+    given(np.uint8, 3),
+    given(np.float32),
+    given(np.float32, 3),
+    given(np.float32, 2),
+    given(np.uint8, 2),
+    changed(np.uint8, 2),
+    np.float32,
+    np.float32,
+)
 def evenly_darker(
     image: NDArray[np.uint8],
     exposure: Single,

@@ -106,7 +106,9 @@ def _canvas(
     support[:, (xs < 0) | (xs >= frame[1])] = UNKNOWN
     picture = np.zeros((0, 0, 3), np.float32)
     if image is not None:
-        picture = image[np.ix_(np.clip(ys, 0, frame[0] - 1), np.clip(xs, 0, frame[1] - 1))].astype(np.float32)
+        picture = image[np.ix_(np.clip(ys, 0, frame[0] - 1), np.clip(xs, 0, frame[1] - 1))].astype(
+            np.float32, order="C"
+        )
     return Canvas(support, picture, float(x1), float(y1), cell)
 
 
