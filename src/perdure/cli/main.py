@@ -17,6 +17,7 @@ from perdure.cli.draw import draw
 from perdure.cli.export import export
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
+from perdure.cli.warmup import warmup
 from perdure.errors import DamagedVideo, PerdureError
 
 DONE, MISTAKE, PART_LOST, INTERRUPTED = 0, 2, 3, 130  # and 1: a defect of ours, by its traceback
@@ -44,7 +45,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, detect, draw, export, demo):
+for command in (track, detect, draw, export, demo, warmup):
     app.command()(_interruptible(command))
 app.command(cls=ScoreCommand)(_interruptible(score))
 

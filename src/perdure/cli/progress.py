@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import logging
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 from rich.console import Console
@@ -21,6 +24,7 @@ from rich.progress import Task as RichTask
 from rich.text import Text
 
 T = TypeVar("T")
+COMPILING = "compiling kernels, once per machine…"
 _QUIET_INTERVAL = 10.0  # s between lines where stderr is not a terminal
 
 
@@ -33,13 +37,44 @@ def watched(items: Iterable[T], what: str, total: int | None, unit: str = "frame
         yield from _with_bar(items, what, total)
         return
     begun = said = time.monotonic()
-    for done, item in enumerate(items, 1):
-        yield item
-        now = time.monotonic()
-        if now - said > _QUIET_INTERVAL:
-            said = now
-            of = f" of {total}" if total else ""
-            print(f"{what}: {done}{of} {unit}, {done / (now - begun):.1f} a second", file=sys.stderr)
+    with kernel_news(functools.cache(lambda: print(f"{what}: {COMPILING}", file=sys.stderr))):
+        for done, item in enumerate(items, 1):
+            yield item
+            now = time.monotonic()
+            if now - said > _QUIET_INTERVAL:
+                said = now
+                of = f" of {total}" if total else ""
+                print(f"{what}: {done}{of} {unit}, {done / (now - begun):.1f} a second", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def kernel_news(compiling: Callable[[], object]) -> Iterator[None]:
+    """Within the context, call `compiling` for each kernel that is not there yet, and print what kernels warn of.
+
+    They tell both to a logger, so that nothing need load them before they are needed.
+    """
+    log = logging.getLogger("perdure.kernels")
+    listener = _Listener(compiling)
+    before = log.level
+    log.addHandler(listener)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(listener)
+        log.setLevel(before)
+
+
+class _Listener(logging.Handler):
+    def __init__(self, compiling: Callable[[], object]) -> None:
+        super().__init__()
+        self._compiling = compiling
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.WARNING:
+            print(f"perdure: note: {record.getMessage()}", file=sys.stderr)
+        else:
+            self._compiling()
 
 
 def _with_bar(items: Iterable[T], what: str, total: int | None) -> Iterator[T]:
@@ -53,9 +88,14 @@ def _with_bar(items: Iterable[T], what: str, total: int | None) -> Iterator[T]:
     ]
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=total)
-        for item in items:
-            yield item
-            progress.advance(task)
+
+        def compiling() -> None:
+            progress.update(task, description=f"{what}: {COMPILING}", refresh=True)
+
+        with kernel_news(compiling):
+            for item in items:
+                yield item
+                progress.update(task, description=what, advance=1)
 
 
 class _Rate(ProgressColumn):
