@@ -11,7 +11,7 @@ from perdure.cli.progress import kernel_news
 
 def warmup(json_: options.JsonOption = False) -> None:
     """Compile all kernels ahead: once per machine, for an image of a container, or after an update."""
-    begun = time.perf_counter()
+    begun, worked = time.perf_counter(), time.process_time()
     from perdure.maths.kernels.ahead import ready  # numba: half a second that no other command should cost
 
     loaded = time.perf_counter() - begun
@@ -37,6 +37,7 @@ def warmup(json_: options.JsonOption = False) -> None:
             "compiled": compiled,
             "loading": round(loaded, 3),
             "seconds": round(seconds, 3),
+            "processor_seconds": round(time.process_time() - worked, 3),
             "places": places,
         }
         print(json.dumps(value))
