@@ -13,8 +13,6 @@ from perdure.maths.kernels.mixtures import (
     expect_twin,
     log_densities,
     log_densities_twin,
-    terms,
-    terms_twin,
 )
 from perdure.maths.mixture import LEAST, Mixture, fit, log_density, subsample
 
@@ -56,18 +54,6 @@ def kernel_arguments(seed, components, dimensions, count, dtype):
 
 several = given(st.integers(0, 2**32 - 1), st.integers(0, 6), st.integers(1, 4), st.integers(0, 2 * BLOCK + 3))
 quick = settings(max_examples=40)
-
-
-@quick
-@several
-def test_terms_are_those_of_the_twin(seed, components, dimensions, count):
-    points, *forms = kernel_arguments(seed, components, dimensions, count % BLOCK, np.float64)
-    block = np.zeros((dimensions, BLOCK))
-    block[:, : len(points)] = points.T
-    one, other = (np.zeros((components, BLOCK)) for _ in range(2))
-    terms(block, len(points), *forms, one)
-    terms_twin(block, len(points), *forms, other)
-    np.testing.assert_allclose(one, other, rtol=1e-10)
 
 
 @quick

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import kernel
+from perdure.maths.kernels.compile import changed, given, kernel, kernel_for
 
 Floats = NDArray[Any]  # float32 or float64, the same in all arguments of one call
 Float = NDArray[np.float64]
@@ -23,7 +23,7 @@ NOTHING = -40.0  # log of a share that a float64 sum cannot feel
 
 
 @kernel
-def terms(block: Floats, count: int, heights: Floats, means: Floats, factors: Floats, out: Floats) -> None:
+def _terms(block: Floats, count: int, heights: Floats, means: Floats, factors: Floats, out: Floats) -> None:
     """Write log(weight · density) of a block's points under every component.
 
     Parameters
@@ -68,7 +68,15 @@ def terms(block: Floats, count: int, heights: Floats, means: Floats, factors: Fl
                 row[i] = height - half * squared
 
 
-@kernel
+@kernel_for(
+    given(np.float32, 2, "C"),
+    given(np.float32, 1, "C"),
+    given(np.float32, 2, "C"),
+    given(np.float32, 3, "C"),
+    np.float32,
+    changed(np.float32, 2),
+    changed(np.float32),
+)
 def log_densities(
     points: NDArray[np.float32],
     heights: NDArray[np.float32],
@@ -83,7 +91,7 @@ def log_densities(
     Parameters
     ----------
     points, heights, means, factors : float32
-        As in `terms`.
+        As in `_terms`.
     least : float32
         Also the density of a point that is not a number.
     room : (K + 2 + D, BLOCK) float32, changed
@@ -99,7 +107,7 @@ def log_densities(
         for i in range(count):
             for d in range(points.shape[1]):
                 block[d, i] = points[begin + i, d]
-        terms(block, count, heights, means, factors, room)
+        _terms(block, count, heights, means, factors, room)
         for i in range(count):
             best[i] = enough
         for k in range(components):
@@ -140,7 +148,15 @@ def _share(log: np.float32) -> np.float32:
     return series * series
 
 
-@kernel
+@kernel_for(
+    given(np.float64, 2, "C"),
+    given(np.float64, 1, "C"),
+    given(np.float64, 1, "C"),
+    given(np.float64, 2, "C"),
+    given(np.float64, 3, "C"),
+    changed(np.float64, 2),
+    changed(np.float64, 2),
+)
 def expect(
     points: Float, weights: Float, heights: Float, means: Float, factors: Float, room: Float, sums: Float
 ) -> float:
@@ -149,7 +165,7 @@ def expect(
     Parameters
     ----------
     points, heights, means, factors : float64
-        As in `terms`; K ≥ 1, all finite.
+        As in `_terms`; K ≥ 1, all finite.
     weights : (N,) float64
         How often each point counts.
     room : (K + 1 + D, BLOCK) float64, changed
@@ -164,7 +180,7 @@ def expect(
         for i in range(count):
             for d in range(points.shape[1]):
                 block[d, i] = points[begin + i, d]
-        terms(block, count, heights, means, factors, room)
+        _terms(block, count, heights, means, factors, room)
         for i in range(count):
             best[i] = room[0, i]
         for k in range(1, components):
@@ -195,8 +211,8 @@ def expect(
     return likelihood
 
 
-def terms_twin(block: Floats, count: int, heights: Floats, means: Floats, factors: Floats, out: Floats) -> None:
-    """Do the same in NumPy: the oracle of `terms`."""
+def _terms_twin(block: Floats, count: int, heights: Floats, means: Floats, factors: Floats, out: Floats) -> None:
+    """Do the same in NumPy: the oracle of `_terms`."""
     away = block.T[None, :count] - means[:, None]  # (K, n, D)
     along = np.einsum("kde,kne->knd", np.tril(factors), away)
     out[: len(heights), :count] = heights[:, None] - (along**2).sum(axis=2) / 2
@@ -213,7 +229,7 @@ def log_densities_twin(
 ) -> None:
     """Do the same in NumPy: the oracle of `log_densities`."""
     every = np.full((len(heights) + 1, len(points)), -np.inf)
-    terms_twin(points.T, len(points), heights, means, factors, every)
+    _terms_twin(points.T, len(points), heights, means, factors, every)
     found = np.logaddexp.reduce(every, axis=0)
     out[...] = np.where(found > least, found, least)
 
@@ -223,7 +239,7 @@ def expect_twin(
 ) -> float:
     """Do the same in NumPy: the oracle of `expect`."""
     every = np.empty((len(heights), len(points)))
-    terms_twin(points.T, len(points), heights, means, factors, every)
+    _terms_twin(points.T, len(points), heights, means, factors, every)
     found = np.logaddexp.reduce(every, axis=0)
     shares = np.exp(every - found) * weights  # (K, N)
     away = points[None] - means[:, None]  # (K, N, D)
