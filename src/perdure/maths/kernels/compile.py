@@ -7,7 +7,9 @@ from typing import Any, Literal, TypeVar, cast
 
 import numba
 import numpy as np
+from llvmlite.ir import Constant
 from numba import types
+from numba.extending import intrinsic
 
 from perdure.maths.kernels.kept import Kept
 
@@ -54,6 +56,14 @@ def kernel(function: F) -> F:
     return cast(F, made)
 
 
+def part(function: F) -> F:
+    """Compile a part of a kernel, which becomes code of its caller: for a call in the innermost loop.
+
+    Every call is a copy, to be compiled again.
+    """
+    return cast(F, numba.njit(nogil=True, fastmath=False, error_model="numpy", forceinline=True)(function))
+
+
 def given(kind: type[np.generic], dimensions: int = 1, layout: Literal["A", "C"] = "A") -> Any:
     """Declare an array that is only read; with `layout` 'C' a contiguous one, which is faster to go over."""
     return types.Array(_scalar(kind), dimensions, layout, readonly=True)
@@ -74,3 +84,28 @@ def compile_declared(kernel: Any) -> Any:
 
 def _scalar(kind: type[np.generic]) -> Any:
     return numba.from_dtype(np.dtype(kind))
+
+
+def _borrowed(typing: Any, array: Any) -> Any:
+    def lowered(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        copy = context.make_array(signature.return_type)(context, builder, value=values[0])
+        copy.meminfo = Constant(copy.meminfo.type, None)
+        copy.parent = Constant(copy.parent.type, None)
+        return copy._getvalue()
+
+    return array(array), lowered
+
+
+def _lowest(typing: Any, bits: Any) -> Any:
+    def lowered(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.cttz(values[0], context.get_constant(types.boolean, True))
+
+    return types.int64(types.int64), lowered
+
+
+# The same array without its reference count, good for as long as the kernel's caller holds it. Numba counts a reference,
+# atomically, each time an array is handed to a part: in a loop over pixels that is most of the time.
+borrowed: Any = intrinsic(_borrowed)
+
+# The place of the lowest bit that is set; some bit must be.
+lowest: Any = intrinsic(_lowest)
