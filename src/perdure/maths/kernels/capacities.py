@@ -1,0 +1,193 @@
+"""Whole capacities of a flow problem from the weights of an energy; see `perdure.maths.maxflow`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.maths.kernels.compile import changed, given, kernel_for
+
+Float = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Ways = NDArray[np.uint16]
+
+MOST = 2**29 - 1  # an arc holds up to twice its capacity, an excess what is added to it later
+
+
+@kernel_for(
+    given(np.float64, 2, "C"),
+    given(np.float64, 3, "C"),
+    float,
+    changed(np.int32),
+    changed(np.int32),
+    changed(np.uint16),
+    int,
+)
+def fill(
+    unary: Float, pairwise: Float, scale: float, residual: Ints, excess: Ints, way: Ways, width: int
+) -> tuple[int, bool]:
+    """Write capacities of arcs and excesses of pixels; return the sum of the unaries below 0, and whether all fit.
+
+    Parameters
+    ----------
+    unary, pairwise : (H, W), (D / 2, H, W) float64
+        D is 4 or 8: weights to the neighbours E, S, SE, SW. Weights of edges that leave the picture are not read.
+    scale : float
+        Capacities a unit of weight.
+    residual, excess, way : (≥ P * 8,), (≥ P,) int32, (≥ P,) uint16, changed
+        Of a grid with a border; only what lies in the picture is written.
+    width : int
+        Pixels from a row of the grid to the next.
+    """
+    height, wide = unary.shape
+    below, good = 0, True
+    for pixel in range(way.shape[0]):
+        way[pixel] = 0
+    for y in range(height):
+        row = (y + 1) * width + 1
+        for x in range(wide):
+            value = unary[y, x] * scale
+            fits = abs(value) <= MOST
+            good = good and fits
+            whole = int(np.floor(value + 0.5)) if fits else 0
+            below += min(whole, 0)
+            excess[row + x] = -whole
+        for d in range(pairwise.shape[0]):
+            begin = 1 if d == 3 else 0
+            end = wide - 1 if d == 0 or d == 2 else wide
+            if d > 0 and y == height - 1:
+                continue
+            across = 1 if d == 0 or d == 2 else (0 if d == 1 else -1)
+            back = (across + (0 if d == 0 else width)) * 8 + 1
+            for x in range(begin, end):
+                value = pairwise[d, y, x] * scale
+                fits = value >= 0.0 and value <= MOST
+                good = good and fits
+                whole = int(value + 0.5) if fits else 0
+                place = (row + x) * 8 + 2 * d
+                residual[place] = whole
+                residual[place + back] = whole
+            for x in range(begin, end):  # bits of both pixels, there and back
+                way[row + x] |= np.uint16(257 << (2 * d)) if pairwise[d, y, x] * scale >= 0.5 else np.uint16(0)
+            for x in range(begin, end):
+                way[row + x + back // 8] |= (
+                    np.uint16(257 << (2 * d + 1)) if pairwise[d, y, x] * scale >= 0.5 else np.uint16(0)
+                )
+    return below, good
+
+
+@kernel_for(given(np.bool_, 2, "C"), changed(np.int32), changed(np.int32), changed(np.uint16), int)
+def forbid(domain: NDArray[np.bool_], residual: Ints, excess: Ints, way: Ways, width: int) -> int:
+    """Take the pixels outside a domain (H, W) out of the problem; return the sum of their unaries below 0."""
+    offsets = (1, -1, width, -width, width + 1, -width - 1, width - 1, -width + 1)
+    below = 0
+    for y in range(domain.shape[0]):
+        for x in range(domain.shape[1]):
+            if domain[y, x]:
+                continue
+            pixel = (y + 1) * width + 1 + x
+            below += min(-excess[pixel], 0)
+            excess[pixel] = 0
+            for j in range(8):
+                residual[pixel * 8 + j] = residual[(pixel + offsets[j]) * 8 + (j ^ 1)] = 0
+                way[pixel + offsets[j]] &= 65535 - (257 << (j ^ 1))
+            way[pixel] = 0
+    return below
+
+
+@kernel_for(given(np.float64, 2, "C"), given(np.bool_, 2, "C"), float, changed(np.int32), int, int)
+def shift(
+    change: Float, domain: NDArray[np.bool_], scale: float, excess: Ints, height: int, wide: int
+) -> tuple[int, bool]:
+    """Add to the unaries of a problem that was solved; return by how much its constant grows, and whether all fit.
+
+    Parameters
+    ----------
+    change : (H, W) float, or (1, 1) for all pixels alike
+        What is added to the unaries.
+    domain : (H, W) bool, or (0, 0)
+        Only these pixels; (0, 0) for all.
+    scale, excess
+        As in `fill`. Nothing is written if something does not fit.
+    height, wide : int
+        Of the picture.
+    """
+    width = wide + 1
+    grown: Any = 0
+    good: Any = True
+    one = change.shape[0] == 1 and change.shape[1] == 1
+    for turn in range(2):
+        if turn == 1 and not good:
+            break
+        for y in range(height):
+            for x in range(wide):
+                if domain.shape[0] > 0 and not domain[y, x]:
+                    continue
+                value = (change[0, 0] if one else change[y, x]) * scale
+                fits = abs(value) <= MOST
+                pixel = (y + 1) * width + 1 + x
+                before: Any = np.int64(excess[pixel])
+                after: Any = before - (int(np.floor(value + 0.5)) if fits else 0)
+                if turn == 0:
+                    good = good and fits and abs(after) <= 2 * MOST
+                else:
+                    excess[pixel] = after
+                    grown += max(before, 0) - max(after, 0)
+    return grown, good
+
+
+@kernel_for(
+    changed(np.int32), int, int, changed(np.uint32), changed(np.int32), changed(np.int32), changed(np.int32)
+)
+def join(
+    pixels: Ints, width: int, wide: int, bits: NDArray[np.uint32], ranks: Ints, begins: Ints, ways: Ints
+) -> int:
+    """Order links by their pixels; return how many pixels have any.
+
+    Parameters
+    ----------
+    pixels : (L,) int32, changed
+        From flat places in a picture `wide` pixels wide to places in the grid.
+    width, wide : int
+        Pixels from a row of the grid to the next, and in a row of the picture.
+    bits, ranks : (P / 32,), changed
+        Which pixels have links, and how many before.
+    begins, ways : (≥ L + 1,), (≥ L,), changed
+        Where each such pixel's links begin in `ways`, and the links in this order.
+    """
+    count = len(pixels)
+    for word in range(len(bits)):
+        bits[word] = 0
+    for link in range(count):
+        place = pixels[link]
+        pixel = (place // wide + 1) * width + 1 + place % wide
+        pixels[link] = pixel
+        bits[pixel >> 5] |= np.uint32(1) << np.uint32(pixel & 31)
+    linked = 0
+    for word in range(len(bits)):
+        ranks[word] = linked
+        left = bits[word]
+        while left != 0:
+            left &= left - np.uint32(1)
+            linked += 1
+    for place in range(linked + 1):
+        begins[place] = 0
+    for turn in range(2):  # first how many links each pixel has, then which
+        for link in range(count):
+            pixel = pixels[link]
+            left = bits[pixel >> 5] & ((np.uint32(1) << np.uint32(pixel & 31)) - np.uint32(1))
+            place = np.int64(ranks[pixel >> 5])
+            while left != 0:
+                left &= left - np.uint32(1)
+                place += 1
+            if turn == 0:
+                begins[place] += 1
+            else:
+                begins[place] -= 1
+                ways[begins[place]] = link
+        if turn == 0:
+            for place in range(1, linked + 1):
+                begins[place] += begins[place - 1]
+    return linked
