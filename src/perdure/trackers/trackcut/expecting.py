@@ -1,0 +1,151 @@
+"""What is expected of an object in a frame, and the evidence of every cell round it (eq. 1-9, 14-16)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.trackers.trackcut import places
+from perdure.trackers.trackcut.likelihoods import of_colours, of_motions
+from perdure.trackers.trackcut.seeing import Motion, Sight
+from perdure.trackers.trackcut.shapes import depth, in_window, recent_motion, similarity
+from perdure.trackers.trackcut.targets import Target
+from perdure.trackers.trackcut.windows import Window, around
+
+Float = NDArray[np.float32]
+Bits = NDArray[np.bool_]
+_CORE = 1.0  # cells from the edge, from which flow is the object's own
+_ENOUGH = 30  # cells of core
+_MARGIN = 2.0  # cells by which the remembered silhouette counts for less than the last one
+_HALF = 0.5  # share of the remembered silhouette below which the last one is not enough
+_SLOPE, _LEAST_SLOPE = 0.06, 3.0  # of the object's side, cells: distance over which the prediction is unsure
+_SURE = 3.0  # multiples of that, beyond which it is no surer
+_INNER = 2.0  # cells
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What each evidence counts, and its bound, nats."""
+
+    colour: float
+    trust: float  # in the colours that the object had at first
+    place: float
+    motion: float
+    shape: float
+    bound: float
+
+
+class Expected(NamedTuple):
+    """An object in its window."""
+
+    window: Window
+    colours: Float  # (h, w, 3)
+    last: Bits  # (h, w) its pixels, carried on by flow (eq. 3)
+    belief: Float  # (h, w) its remembered silhouette, carried on as a whole
+    predicted: Bits  # (h, w) O at t given t-1
+    moved: NDArray[np.float64]  # (2,) px a frame, beyond the camera's
+    unary: Float  # (h, w) cost of being the object's less that of not being
+
+
+def middle_of(target: Target) -> tuple[float, float]:
+    """Return the middle of the remembered silhouette, x, y."""
+    x1, y1, x2, y2 = target.shape.box
+    return (x1 + x2) / 2, (y1 + y2) / 2
+
+
+def carried(target: Target, motion: Motion) -> NDArray[np.float64]:
+    """Return by how much (2,) the object should have moved since the frame before, px: its own motion and the camera's."""
+    x, y = middle_of(target)
+    camera = motion.of_camera(np.array([x], np.float32), np.array([y], np.float32))[0]
+    return np.asarray(recent_motion(target) + camera, np.float64)
+
+
+def expect(
+    target: Target,
+    before: NDArray[np.uint8],
+    sight: Sight,
+    motion: Motion,
+    ring: float,
+    cells: int,
+    weights: Weights,
+) -> Expected:
+    """Return what is expected of an object, and the evidence round it.
+
+    Parameters
+    ----------
+    target : Target
+        As of the frame before.
+    before : (H, W, 3) uint8
+        Colours of the frame before.
+    sight, motion
+        The frame, and how everything came there.
+    ring : float
+        Pixels round the object that are looked at.
+    cells : int
+        How many are looked at, at most.
+    weights : Weights
+        Of the evidence.
+    """
+    height, width = sight.colours.shape[:2]
+    drift = carried(target, motion)
+    x1, y1, x2, y2 = target.shape.box
+    boxes = [(x1 + drift[0], y1 + drift[1], x2 + drift[0], y2 + drift[1])]
+    if target.mask.area:
+        a1, b1, a2, b2 = target.mask.box
+        boxes.append((a1 + drift[0], b1 + drift[1], a2 + drift[0], b2 + drift[1]))
+    window = around(boxes, ring, cells, (height, width))
+    x, y = window.places()
+    flow = motion.at(window)  # (h, w, 2)
+    camera = motion.of_camera(x, y)
+    came = np.stack([x - flow[..., 0], y - flow[..., 1]], axis=2)  # where each cell was
+    last = _carry_mask(target, window, came)
+    core = depth(last) > _CORE
+    if core.sum() > _ENOUGH and not target.partly:
+        move = similarity(x[core], y[core], flow[core])
+        moved = move[0][:2] - camera[core].mean(axis=0)
+    else:
+        middle = middle_of(target)
+        move = (
+            np.array([drift[0], drift[1], 0.0, 0.0]),
+            (middle[0] + float(drift[0]), middle[1] + float(drift[1])),
+        )
+        moved = recent_motion(target)
+    belief = in_window(target.shape, window, move)
+    whole = belief > 0.5
+    lost = last.sum() < _HALF * whole.sum()
+    predicted = whole if target.together and whole.any() else last | whole if lost else last
+    if not predicted.any():
+        predicted = whole
+    colours = window.cut(sight.colours)
+    points = colours.reshape(-1, 3).astype(np.float32)
+    looks = of_colours(points, target.first, target.last, weights.trust, weights.bound).reshape(window.shape)
+    sure = depth(predicted) > _INNER
+    own = None if not lost else recent_motion(target).astype(np.float32)
+    motions = of_motions(flow - camera, sure if sure.any() else predicted, weights.bound, own)
+    votes = _votes(before, window, came, last, colours, weights.bound) if not lost else np.zeros_like(looks)
+    away = np.maximum(depth(predicted), depth(whole) - _MARGIN)
+    slope = max(_SLOPE * float(np.sqrt(max(predicted.sum(), whole.sum()))), _LEAST_SLOPE)
+    shape = np.clip(away / slope, -_SURE, _SURE)
+    evidence = weights.colour * looks + weights.place * votes + weights.motion * motions + weights.shape * shape
+    return Expected(window, colours.astype(np.float32), last, belief, predicted, moved, -evidence)
+
+
+def _carry_mask(target: Target, window: Window, came: Float) -> Bits:
+    """The pixels of the object, each carried on by flow."""
+    if not target.mask.area:
+        return np.zeros(window.shape, np.bool_)
+    bits = target.mask.bits.astype(np.float32)
+    x, y = came[..., 0] - np.float32(target.mask.x), came[..., 1] - np.float32(target.mask.y)
+    return np.asarray(cv2.remap(bits, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0) > 0.5)
+
+
+def _votes(
+    before: NDArray[np.uint8], window: Window, came: Float, own: Bits, colours: NDArray[np.uint8], bound: float
+) -> Float:
+    """Votes of the frame before, its pixels where they are now."""
+    was = cv2.remap(before, came[..., 0], came[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    return places.vote(np.asarray(was, np.uint8), own, colours, bound)

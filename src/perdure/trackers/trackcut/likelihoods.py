@@ -1,0 +1,66 @@
+"""How much more a pixel looks, and moves, like the object than like its surroundings (eq. 6-9)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.maths.mixture import Mixture, fit, log_density, subsample
+from perdure.trackers.trackcut.targets import Colours
+
+Float = NDArray[np.float32]
+_SAMPLE = 2000  # pixels a mixture is fitted to, at most
+_FLOOR = 4.0  # least variance of colours
+_STEPS = 4  # of EM
+_STILL = 0.4  # px a frame by which flow errs at least
+_ROUGH = 0.1  # share of a motion by which parts of an object differ from it
+
+
+def learn_colours(
+    colours: Float,
+    inside: NDArray[np.bool_],
+    near: NDArray[np.bool_],
+    components: int,
+    start: Colours | None = None,
+) -> Colours:
+    """Return mixtures of the colours (h, w, 3) inside an object and near it, outside (eq. 6)."""
+    own, other = colours[inside], colours[near & ~inside]
+    return Colours(
+        _fitted(own, components, start.own if start else None),
+        _fitted(other, components, start.other if start else None),
+    )
+
+
+def _fitted(points: Float, components: int, start: Mixture | None) -> Mixture:
+    if not len(points):
+        return start if start is not None else Mixture.empty(3)
+    return fit(subsample(points, _SAMPLE), components, start=start, iterations=_STEPS, floor=_FLOOR)
+
+
+def of_colours(points: Float, first: Colours, last: Colours, trust: float, bound: float) -> Float:
+    """Return ln p / q (N,) of colours (N, 3), within ± bound: of the looks at first, `trust`, and at last (eq. 8)."""
+    own = _either(log_density(first.own, points), log_density(last.own, points), trust)
+    other = _either(log_density(first.other, points), log_density(last.other, points), trust)
+    return np.asarray(np.clip(own - other, -bound, bound), np.float32)
+
+
+def _either(first: Float, last: Float, trust: float) -> Float:
+    return np.asarray(np.logaddexp(first + np.log(trust + 1e-9), last + np.log(1 - trust + 1e-9)), np.float32)
+
+
+def of_motions(flow: Float, sure: NDArray[np.bool_], bound: float, known: Float | None = None) -> Float:
+    """Return ln p / q (h, w) of motions (h, w, 2) beyond the camera's, within ± bound.
+
+    Flow errs often and far, so both are heavy-tailed (Student, three degrees of freedom): about the median motion of
+    the pixels that are `sure` to be the object's, or a `known` motion (2,), and about rest.
+    """
+    if known is None and not sure.any():
+        return np.zeros(flow.shape[:2], np.float32)
+    own = flow[sure] if known is None else known[None]
+    middle = np.median(own, axis=0)
+    spread = np.maximum(1.5 * np.median(np.abs(own - middle), axis=0), _STILL) + _ROUGH * np.abs(middle)
+    far = (((flow - middle) / spread) ** 2).sum(axis=2)
+    rest = (flow**2).sum(axis=2) / _STILL**2
+    own_log = -1.5 * np.log1p(far / 2) - np.log(spread).sum()
+    rest_log = -1.5 * np.log1p(rest / 2) - 2 * np.log(_STILL)
+    return np.asarray(np.clip(own_log - rest_log, -bound, bound), np.float32)

@@ -1,0 +1,74 @@
+"""What a frame shows: colours, and how everything has moved since the frame before."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.maths.flow import Flow, dense, global_motion
+from perdure.trackers.trackcut.windows import Window
+from perdure.types import Bits, Image
+
+Float = NDArray[np.float32]
+_FLOW_ROWS = 300  # rows of the picture, about, in which flow is looked for
+
+
+class Sight(NamedTuple):
+    """A frame."""
+
+    colours: NDArray[np.uint8]  # (H, W, 3) Lab: distances are as seen, light is one channel
+    grey: NDArray[np.uint8]  # (h, w), smaller by `step`
+    step: int
+
+
+class Motion(NamedTuple):
+    """How what is seen came here from the frame before."""
+
+    flow: Flow  # (h, w, 2) px of the small picture, from there to here
+    camera: NDArray[np.float64]  # (2, 3) affine, small picture before -> small picture now, of what stands still
+    step: int
+
+    def at(self, window: Window) -> Float:
+        """Return the displacement (h, w, 2), px a frame, of what is now in each cell of a window."""
+        x, y = window.places()
+        half = (self.step - 1) / 2
+        return cv2.remap(
+            self.flow.vectors,
+            (x - half) / self.step,
+            (y - half) / self.step,
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        ) * np.float32(self.step)
+
+    def of_camera(self, x: Float, y: Float) -> Float:
+        """Return the displacement (…, 2), px a frame, that the camera's motion gives what is now at x, y."""
+        half = (self.step - 1) / 2
+        back = cv2.invertAffineTransform(self.camera)
+        u, v = (x - half) / self.step, (y - half) / self.step
+        moved = np.stack(
+            [
+                u - (back[0, 0] * u + back[0, 1] * v + back[0, 2]),
+                v - (back[1, 0] * u + back[1, 1] * v + back[1, 2]),
+            ],
+            axis=-1,
+        )
+        return np.asarray(moved * self.step, np.float32)
+
+
+def look_at(image: Image) -> Sight:
+    """Return what a picture (H, W, 3) RGB shows."""
+    step = max(1, round(min(image.shape[:2]) / _FLOW_ROWS))
+    grey = cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
+    if step > 1:
+        grey = cv2.resize(grey, (grey.shape[1] // step, grey.shape[0] // step), interpolation=cv2.INTER_AREA)
+    return Sight(np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2LAB), np.uint8), np.asarray(grey, np.uint8), step)
+
+
+def motion_between(before: NDArray[np.uint8], now: Sight, things: Bits) -> Motion:
+    """Return the motion from a small grey picture (h, w) to a frame; `things` (h, w) do not tell of the camera's."""
+    return Motion(
+        dense(before, now.grey, preset="medium", astray=1e6), global_motion(before, now.grey, things), now.step
+    )

@@ -1,0 +1,81 @@
+"""Who owns which pixel where several objects claim the same (§4, eq. 17, 18)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.maths.expansion import expand
+from perdure.trackers.trackcut.cutting import contrast
+from perdure.trackers.trackcut.shapes import depth, in_window
+from perdure.trackers.trackcut.targets import Shape
+from perdure.trackers.trackcut.windows import around
+from perdure.types import Mask
+
+Float = NDArray[np.float32]
+_OUTSIDE = 4.0  # κ: what a pixel outside an object's prediction costs it
+_LOOKS = 0.3  # weight of what a pixel looks like
+_FAR = 0.1  # of each cell of distance from the prediction
+_MARGIN = 4.0  # pixels round a cluster
+
+
+def clusters(masks: list[Mask]) -> list[list[int]]:
+    """Return the numbers of masks that hang together by common pixels, of every company of two or more."""
+    company = list(range(len(masks)))
+    for one in range(len(masks)):
+        for other in range(one):
+            if company[one] != company[other] and _common(masks[one], masks[other]):
+                old, new = company[one], company[other]
+                company = [new if number == old else number for number in company]
+    found = [[k for k, number in enumerate(company) if number == one] for one in sorted(set(company))]
+    return [some for some in found if len(some) > 1]
+
+
+def _common(one: Mask, other: Mask) -> bool:
+    x1, y1 = max(one.box[0], other.box[0]), max(one.box[1], other.box[1])
+    x2, y2 = min(one.box[2], other.box[2]), min(one.box[3], other.box[3])
+    if x1 >= x2 or y1 >= y2:
+        return False
+    first = one.bits[y1 - one.y : y2 - one.y, x1 - one.x : x2 - one.x]
+    return bool((first & other.bits[y1 - other.y : y2 - other.y, x1 - other.x : x2 - other.x]).any())
+
+
+def separate(
+    masks: list[Mask],
+    predicted: list[Shape],
+    looks: list[Callable[[Float], Float]],
+    colours: NDArray[np.uint8],
+    weight: float,
+    cells: int,
+) -> list[Mask]:
+    """Return the masks of objects that overlap, each pixel given to one of them (eq. 17).
+
+    Parameters
+    ----------
+    masks : list of Mask
+        What each object claims.
+    predicted : list of Shape
+        Where each should be.
+    looks : list of functions
+        Of each object: ln p (h, w) of colours (h, w, 3).
+    colours : (H, W, 3) uint8
+        The picture.
+    weight : float
+        λ3.
+    cells : int
+        How finely it is looked at, at most.
+    """
+    height, width = colours.shape[:2]
+    window = around([mask.box for mask in masks], _MARGIN, cells, (height, width))
+    claimed = np.stack([window.of_mask(mask) > 0.5 for mask in masks])  # (N, h, w)
+    domain = np.asarray(claimed.any(axis=0), np.bool_)
+    seen = window.cut(colours).astype(np.float32)
+    costs, _ = contrast(seen, weight)
+    unary = np.zeros((len(masks), *window.shape), np.float64)
+    for number, shape in enumerate(predicted):
+        inside = in_window(shape, window) > 0.5
+        unary[number] = _OUTSIDE * ~inside - _LOOKS * looks[number](seen) - _FAR * np.clip(depth(inside), -20, 20)
+    labels = expand(unary, costs.astype(np.float64), domain=domain).labels
+    return [window.to_mask((labels == number) & domain, height, width) for number in range(len(masks))]

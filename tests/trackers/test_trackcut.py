@@ -1,0 +1,312 @@
+"""Track and Cut on drawn films: what is marked is followed, cut out, hidden, found again; then its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import pytest
+
+from perdure.fold import settle
+from perdure.trackers.trackcut import TrackCut
+from perdure.trackers.trackcut.cutting import contrast, touching
+from perdure.trackers.trackcut.likelihoods import of_motions
+from perdure.trackers.trackcut.places import vote
+from perdure.trackers.trackcut.separating import clusters
+from perdure.trackers.trackcut.shapes import depth, in_window, similarity, to_shape
+from perdure.trackers.trackcut.windows import Window, around
+from perdure.types import Frame, Mask, Regions, Report, Scene, Status, Tracks
+
+HEIGHT, WIDTH = 120, 200
+Place = tuple[int, int]
+
+
+def texture(
+    seed: int, colour: tuple[int, int, int], height: int, width: int, contrast: float = 25.0
+) -> np.ndarray:
+    """A patch (height, width, 3) uint8 with something on it that flow can hold on to."""
+    rng = np.random.default_rng(seed)
+    rough = cv2.GaussianBlur(rng.normal(0, 1, (height, width)), (0, 0), 1.5)
+    rough *= contrast / max(float(rough.std()), 1e-9)
+    return np.clip(np.array(colour) + rough[..., None], 0, 255).astype(np.uint8)
+
+
+GROUND = texture(1, (90, 110, 90), HEIGHT + 80, WIDTH + 200)
+
+
+class Thing(NamedTuple):
+    """An ellipse with a texture; `path(k)` is its middle, or None."""
+
+    path: Callable[[int], Place | None]
+    colour: tuple[int, int, int]
+    size: tuple[int, int] = (28, 44)  # width, height
+
+    def bits(self, k: int) -> np.ndarray:
+        found = np.zeros((HEIGHT, WIDTH), np.uint8)
+        middle = self.path(k)
+        if middle is not None:
+            cv2.ellipse(found, middle, (self.size[0] // 2, self.size[1] // 2), 0, 0, 360, 1, -1)
+        return found > 0
+
+    def paint(self, picture: np.ndarray, k: int) -> None:
+        middle = self.path(k)
+        if middle is None:
+            return
+        skin = texture(7 + self.colour[0], self.colour, HEIGHT, WIDTH)
+        moved = np.roll(skin, (middle[1] - HEIGHT // 2, middle[0] - WIDTH // 2), axis=(0, 1))
+        picture[self.bits(k)] = moved[self.bits(k)]
+
+
+def film(*things: Thing, count: int, pan: int = 0, post: tuple[int, int] | None = None) -> list[Frame]:
+    """Frames of things, later ones in front, on a ground that moves left by `pan` px a frame; a post before all."""
+    frames = []
+    for k in range(count):
+        picture = GROUND[40 : 40 + HEIGHT, pan * k : pan * k + WIDTH].copy()
+        for thing in things:
+            thing.paint(picture, k)
+        if post:
+            picture[:, post[0] : post[1]] = (235, 235, 235)
+        frames.append(Frame(k, k / 10, picture))
+    return frames
+
+
+def marked(*things: Thing) -> Regions:
+    """What a user marks in the first frame."""
+    masks = [Mask.of_image(thing.bits(0)) for thing in things]
+    return Regions.of([mask.box for mask in masks], masks=masks, data={"mark": np.arange(1, len(things) + 1)})
+
+
+def seen(things: tuple[Thing, ...], k: int) -> Regions:
+    """What a detector sees: what touches is one region."""
+    together = np.zeros((HEIGHT, WIDTH), bool)
+    for thing in things:
+        together |= thing.bits(k)
+    count, parts = cv2.connectedComponents(together.astype(np.uint8))
+    masks = [Mask.of_image(parts == part) for part in range(1, count)]
+    return Regions.of([mask.box for mask in masks], masks=masks) if masks else Regions.empty()
+
+
+def followed(
+    frames: list[Frame], regions: Callable[[int], Regions], **parameters: float
+) -> tuple[Tracks, list[Report]]:
+    tracker = TrackCut(**parameters)
+    state, reports = tracker.start(Scene(WIDTH, HEIGHT, 10.0)), []
+    for frame in frames:
+        state, report = tracker.step(state, frame, regions(frame.index))
+        reports.append(report)
+    reports.append(tracker.finish(state))
+    return settle(reports), reports
+
+
+def only_first(*things: Thing) -> Callable[[int], Regions]:
+    return lambda k: marked(*things) if k == 0 else Regions.empty()
+
+
+def overlap(tracks: Tracks, k: int, identity: int, bits: np.ndarray) -> float:
+    """Intersection over union of what is said and what is there."""
+    rows = tracks.in_frame(k)
+    place = np.flatnonzero(rows.ids == identity)
+    said = rows.masks[int(place[0])].to_image(HEIGHT, WIDTH) if len(place) else np.zeros_like(bits)
+    return float((said & bits).sum() / max((said | bits).sum(), 1))
+
+
+def walker(x: int = 40, y: int = 60, step: int = 3, colour: tuple[int, int, int] = (170, 60, 60)) -> Thing:
+    return Thing(lambda k: (x + step * k, y), colour)
+
+
+def test_what_is_marked_is_followed_without_a_detector():
+    thing = walker()
+    tracks, _ = followed(film(thing, count=30), only_first(thing))
+    assert np.unique(tracks.ids).tolist() == [1]
+    assert min(overlap(tracks, k, 1, thing.bits(k)) for k in range(30)) > 0.85
+
+
+def test_the_camera_may_move():
+    thing = walker(x=90, step=0)
+    tracks, _ = followed(film(thing, count=30, pan=4), only_first(thing))
+    assert min(overlap(tracks, k, 1, thing.bits(k)) for k in range(30)) > 0.85
+
+
+def test_an_object_much_like_the_ground_is_held_by_its_motion():
+    thing = walker(colour=(112, 124, 108))
+    tracks, _ = followed(film(thing, count=25), only_first(thing))
+    assert np.mean([overlap(tracks, k, 1, thing.bits(k)) for k in range(25)]) > 0.6
+
+
+def test_who_passes_behind_a_post_is_found_again_with_her_id():
+    thing = walker(x=30)
+    post = (90, 130)
+    tracks, reports = followed(film(thing, count=42, post=post), only_first(thing))
+    told = [event.kind for report in reports for event in report.events]
+    assert told.count("occluded") == told.count("found_again") == 1
+    hidden = tracks.in_frame(27)
+    assert hidden.status.tolist() == [Status.OCCLUDED]
+    assert hidden.inferred.all()
+    for k in (*range(12), *range(39, 42)):
+        bits = thing.bits(k)
+        bits[:, post[0] : post[1]] = False
+        assert overlap(tracks, k, 1, bits) > 0.75
+
+
+def test_who_is_not_found_again_is_lost_when_patience_ends():
+    thing = Thing(lambda k: (60, 60) if k < 10 else None, (170, 60, 60))
+    tracks, reports = followed(film(thing, count=40), only_first(thing), hidden_for=1.0)
+    assert [event.kind for report in reports for event in report.events] == ["entered", "occluded", "lost"]
+    assert tracks.frames.max() < 22
+
+
+def test_whom_a_detector_sees_for_two_frames_is_somebody():
+    thing = walker()
+    tracks, _ = followed(film(thing, count=12), lambda k: seen((thing,), k) if k != 3 else Regions.empty())
+    assert np.unique(tracks.ids).tolist() == [1]
+    assert tracks.frames.min() <= 1
+    assert len(tracks.in_frame(3)) == 1, "the frame without observations"
+
+
+def test_the_row_names_the_observations_that_the_cut_matched():
+    thing = walker()
+    tracks, _ = followed(film(thing, count=12), lambda k: seen((thing,), k))
+    assert tracks.in_frame(8).links == ((0,),)
+
+
+def test_two_who_cross_keep_their_ids_and_share_no_pixel():
+    red = Thing(lambda k: (30 + 4 * k, 52), (180, 60, 60))
+    blue = Thing(lambda k: (170 - 4 * k, 68), (60, 70, 190))
+    things = (red, blue)
+    tracks, _ = followed(film(*things, count=36), lambda k: seen(things, k))
+    for k in (5, 34):
+        assert overlap(tracks, k, 1, red.bits(k) & ~blue.bits(k)) > 0.75
+        assert overlap(tracks, k, 2, blue.bits(k)) > 0.75
+    for k in range(36):
+        masks = tracks.in_frame(k).masks
+        assert (
+            sum(mask.area for mask in masks)
+            == np.sum([mask.to_image(HEIGHT, WIDTH) for mask in masks], axis=0).astype(bool).sum()
+        )
+
+
+def test_a_blind_frame_keeps_only_the_prediction():
+    thing = walker()
+    frames = film(thing, count=14)
+    dark = Frame(8, 0.8, (frames[8].image // 4).astype(np.uint8))
+    frames[8] = dark
+    blind = Regions(
+        *(getattr(Regions.empty(), name) for name in ("boxes", "scores", "classes", "masks")), blind=True
+    )
+    tracks, _ = followed(frames, lambda k: blind if k == 8 else seen((thing,), k))
+    assert np.unique(tracks.ids).tolist() == [1]
+    assert overlap(tracks, 13, 1, thing.bits(13)) > 0.8
+
+
+@pytest.mark.parametrize("cover", ["everything", "one pixel", "one colour"])
+def test_strange_marks_and_pictures_are_borne(cover: str):
+    bits = np.zeros((HEIGHT, WIDTH), bool)
+    bits[(slice(None),) if cover == "everything" else (slice(60, 61), slice(60, 61))] = True
+    mask = Mask.of_image(bits)
+    mark = Regions.of([mask.box], masks=[mask], data={"mark": np.array([4])})
+    frames = film(count=6)
+    if cover == "one colour":
+        frames = [Frame(k, k / 10, np.full((HEIGHT, WIDTH, 3), 80, np.uint8)) for k in range(6)]
+    tracks, _ = followed(frames, lambda k: mark if k == 0 else Regions.empty())
+    assert set(tracks.ids.tolist()) <= {4}
+
+
+def test_a_mark_says_the_id_and_marking_again_corrects_the_mask():
+    thing = walker()
+    wrong = Thing(lambda k: (150, 60), (170, 60, 60))
+
+    def marks(k: int) -> Regions:
+        if k not in (0, 5):
+            return Regions.empty()
+        mask = Mask.of_image((wrong if k == 0 else thing).bits(k))
+        return Regions.of([mask.box], masks=[mask], data={"mark": np.array([9])})
+
+    tracks, _ = followed(film(thing, count=12), marks)
+    assert np.unique(tracks.ids).tolist() == [9]
+    assert overlap(tracks, 11, 9, thing.bits(11)) > 0.8
+
+
+# ---- parts ------------------------------------------------------------------------------------------------------
+
+
+def test_a_window_of_cells_gives_back_the_mask():
+    mask = Mask.of_image(walker().bits(0))
+    for cells in (10**6, 3000, 900):
+        window = around([mask.box], 10, cells, (HEIGHT, WIDTH))
+        assert np.prod(window.shape) <= 1.4 * cells
+        again = window.to_mask(window.of_mask(mask) > 0.5, HEIGHT, WIDTH)
+        one, other = mask.to_image(HEIGHT, WIDTH), again.to_image(HEIGHT, WIDTH)
+        assert (one & other).sum() / (one | other).sum() >= 1 - 0.08 * (window.step - 1)
+
+
+def test_contrast_costs_less_where_colours_differ_and_diagonals_less_than_sides():
+    colours = np.zeros((6, 8, 3), np.float32)
+    colours[:, 4:] = 100.0
+    costs, sigma = contrast(colours, 10.0)
+    assert sigma > 0
+    assert costs[0, 2, 3] < 0.5 * costs[0, 2, 1] == pytest.approx(5.0)
+    assert costs[2, 2, 1] == pytest.approx(10.0 / np.sqrt(2))
+
+
+def test_a_similarity_is_found_though_a_third_moves_otherwise():
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(0, 50, 300).astype(np.float32), rng.uniform(0, 80, 300).astype(np.float32)
+    flow = np.stack(
+        [3 + 0.02 * (x - x.mean()) - 0.01 * (y - y.mean()), -1 + 0.01 * (x - x.mean()) + 0.02 * (y - y.mean())], 1
+    )
+    flow[::3] = (-6, 8)
+    found, middle = similarity(x, y, flow.astype(np.float32))
+    np.testing.assert_allclose(found, [3, -1, 0.02, 0.01], atol=0.15)
+    assert middle == pytest.approx((x.mean(), y.mean()))
+
+
+def test_a_shape_is_carried_by_its_similarity():
+    window = Window(0, 0, 60, 60, 1)
+    inside = np.zeros((60, 60), np.float32)
+    inside[20:40, 10:30] = 1.0
+    moved = in_window(to_shape(inside, window), window, (np.array([5.0, -3.0, 0.0, 0.0]), (30.0, 30.0)))
+    np.testing.assert_array_equal(moved > 0.5, np.roll(inside, (-3, 5), (0, 1)) > 0.5)
+
+
+def test_motion_speaks_for_what_moves_with_the_object_and_against_what_rests():
+    flow = np.zeros((4, 6, 2), np.float32)
+    flow[:, 3:] = (4.0, 0.0)
+    sure = np.zeros((4, 6), bool)
+    sure[1:3, 4] = True
+    said = of_motions(flow, sure, 4.0)
+    assert said[0, 5] > 2 > -2 > said[0, 0]
+    np.testing.assert_array_equal(of_motions(flow, np.zeros_like(sure), 4.0), 0)
+
+
+def test_colours_speak_where_they_were():
+    before = np.zeros((64, 64, 3), np.uint8)
+    before[:, 32:] = 200
+    own = np.zeros((64, 64), bool)
+    own[:, 32:] = True
+    said = vote(before, own, before, 4.0)
+    assert said[10, 60] > 1 > -1 > said[10, 5]
+    unseen = np.full((64, 64, 3), 100, np.uint8)
+    np.testing.assert_allclose(vote(before, own, unseen, 4.0), 0, atol=1e-6)
+
+
+def test_masks_hang_together_by_common_pixels():
+    one, other, third = (Mask(0, x, np.ones((4, 4), bool)) for x in (0, 3, 20))
+    assert clusters([one, other, third]) == [[0, 1]]
+    assert clusters([one, third]) == []
+
+
+def test_parts_that_touch_nothing_that_was_expected_are_left_out():
+    cells = np.zeros((5, 9), bool)
+    cells[1:3, 1:3] = cells[1:3, 6:8] = True
+    anchors = np.zeros_like(cells)
+    anchors[2, 2] = True
+    assert touching(cells, anchors).sum() == 4
+
+
+def test_depth_is_positive_inside_and_far_where_there_is_nothing():
+    inside = np.zeros((9, 9), bool)
+    assert (depth(inside) < 0).all()
+    inside[3:6, 3:6] = True
+    assert depth(inside)[4, 4] > 1 > -1 > depth(inside)[0, 0]
