@@ -165,6 +165,13 @@ def test_whom_a_detector_sees_for_two_frames_is_somebody():
     assert len(tracks.in_frame(3)) == 1, "the frame without observations"
 
 
+def test_observations_in_one_frame_of_three_are_enough():
+    thing = walker()
+    tracks, _ = followed(film(thing, count=20), lambda k: seen((thing,), k) if k % 3 == 1 else Regions.empty())
+    assert np.unique(tracks.ids).tolist() == [1]
+    assert min(overlap(tracks, k, 1, thing.bits(k)) for k in range(5, 20)) > 0.8
+
+
 def test_the_row_names_the_observations_that_the_cut_matched():
     thing = walker()
     tracks, _ = followed(film(thing, count=12), lambda k: seen((thing,), k))

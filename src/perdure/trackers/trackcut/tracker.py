@@ -324,6 +324,8 @@ class TrackCut:
             next_id = max(next_id, identity + 1)
             born.append(self._newborn(mask, sight, regions, number, frame, state.next_key + len(born), identity))
             events.append(Event("entered", frame.index, frame.index, (identity,)))
+        if not observations:  # a frame in which nothing was looked for: who waits goes on waiting
+            waiting = list(state.waiting)
         return [*targets, *born], born, tuple(waiting), events
 
     def _found_again(self, targets: list[Target], mask: Mask, sight: Sight, identity: int) -> int | None:
