@@ -7,7 +7,6 @@ from typing import Any, Literal, TypeVar, cast
 
 import numba
 import numpy as np
-from llvmlite.ir import Constant
 from numba import types
 from numba.extending import intrinsic
 
@@ -16,7 +15,12 @@ from perdure.maths.kernels.kept import Kept
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def kernel_for(*declared: Any) -> Callable[[F], F]:
+# Nobody calls a kernel from C.
+_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy", "no_cfunc_wrapper": True}
+_UNCOUNTED: dict[str, Any] = {"_nrt": False}  # no reference to an array is counted: for what makes no arrays
+
+
+def kernel_for(*declared: Any, counted: bool = True) -> Callable[[F], F]:
     """Compile a kernel at its first call, for the types declared: what converts to them is taken, nothing else.
 
     One set of types is one compilation, known before anything runs: `perdure warmup` makes them all, and no later
@@ -25,7 +29,11 @@ def kernel_for(*declared: Any) -> Callable[[F], F]:
     Parameters
     ----------
     declared
-        The type of every argument: `given` and `changed` arrays, `int`, `float`, `bool` or a NumPy scalar type.
+        The type of every argument: `given` and `changed` arrays, `int`, `float`, `bool`, a NumPy scalar type, or a
+        type of Numba's.
+    counted
+        Whether references to arrays are counted. A kernel that makes no arrays does without, and must if it has
+        a `part`.
 
     >>> @kernel_for(given(np.uint8), float)
     ... def scaled(numbers, factor):
@@ -36,7 +44,7 @@ def kernel_for(*declared: Any) -> Callable[[F], F]:
     signature = tuple(one if isinstance(one, types.Type) else numba.typeof(one()) for one in declared)
 
     def decorate(function: F) -> F:
-        made: Any = kernel(function)
+        made: Any = _compiled(function, {} if counted else _UNCOUNTED)
         if hasattr(made, "compile"):
             made.declared = signature
             made._compile_for_args = lambda *_, **__: compile_declared(made)
@@ -50,18 +58,23 @@ def kernel(function: F) -> F:
 
     No fastmath and no parallel reductions, so equal input gives equal bytes.
     """
-    made: Any = numba.njit(nogil=True, fastmath=False, error_model="numpy")(function)
-    if hasattr(made, "compile"):  # NUMBA_DISABLE_JIT leaves the function as it is
-        made._cache = Kept(function)  # what cache=True sets to Numba's own
-    return cast(F, made)
+    return cast(F, _compiled(function, {}))
 
 
 def part(function: F) -> F:
-    """Compile a part of a kernel, which becomes code of its caller: for a call in the innermost loop.
+    """Compile a part of an uncounted kernel, which becomes code of its caller: for a call in the innermost loop.
 
-    Every call is a copy, to be compiled again.
+    Every call is a copy, to be compiled again. A part makes no arrays.
     """
-    return cast(F, numba.njit(nogil=True, fastmath=False, error_model="numpy", forceinline=True)(function))
+    more = {**_UNCOUNTED, "forceinline": True, "no_cpython_wrapper": True}
+    return cast(F, numba.njit(**_OPTIONS, **more)(function))
+
+
+def _compiled(function: Any, more: dict[str, Any]) -> Any:
+    made: Any = numba.njit(**_OPTIONS, **more)(function)
+    if hasattr(made, "compile"):  # NUMBA_DISABLE_JIT leaves the function as it is
+        made._cache = Kept(function)  # what cache=True sets to Numba's own
+    return made
 
 
 def given(kind: type[np.generic], dimensions: int = 1, layout: Literal["A", "C"] = "A") -> Any:
@@ -86,26 +99,12 @@ def _scalar(kind: type[np.generic]) -> Any:
     return numba.from_dtype(np.dtype(kind))
 
 
-def _borrowed(typing: Any, array: Any) -> Any:
-    def lowered(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        copy = context.make_array(signature.return_type)(context, builder, value=values[0])
-        copy.meminfo = Constant(copy.meminfo.type, None)
-        copy.parent = Constant(copy.parent.type, None)
-        return copy._getvalue()
-
-    return array(array), lowered
-
-
 def _lowest(typing: Any, bits: Any) -> Any:
     def lowered(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return builder.cttz(values[0], context.get_constant(types.boolean, True))
 
     return types.int64(types.int64), lowered
 
-
-# The same array without its reference count, good for as long as the kernel's caller holds it. Numba counts a reference,
-# atomically, each time an array is handed to a part: in a loop over pixels that is most of the time.
-borrowed: Any = intrinsic(_borrowed)
 
 # The place of the lowest bit that is set; some bit must be.
 lowest: Any = intrinsic(_lowest)

@@ -25,12 +25,13 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import borrowed, changed, kernel_for, lowest, part
+from perdure.maths.kernels.compile import changed, kernel_for, lowest, part
 
 Ints = NDArray[np.int32]
 Int = Any  # a Python int or one of NumPy's: to Numba they are the same
 
-S, T = np.int64(0), np.int64(1)  # the sides
+int64 = np.int64
+S, T = int64(0), int64(1)  # the sides
 ROOT, LINK, NONE, DEAD = 8, 9, 10, 11  # how a node hangs; below 8: by its arc in that direction
 CODE, FOREST, LINKED, LISTED = 15, 16, 64, 128  # bits of a mark; FOREST << side: is in that side's queue
 FAR = 1 << 29  # added to a level that is not yet final
@@ -72,19 +73,15 @@ _KINDS = (np.int32, np.int32, np.int32, np.uint8, np.uint16, np.int32, np.int32,
 _GRAPH = types.NamedTuple([changed(kind) for kind in _KINDS], Graph)
 
 
-@kernel_for(_GRAPH, int)
-def solve(held: Graph, pixels: Int) -> Int:
+@kernel_for(_GRAPH, int, counted=False)
+def solve(graph: Graph, pixels: Int) -> Int:
     """Push all the flow there is; return how much. After it the S forest, key > 0, is the minimal source set.
 
     Changed: residuals, excesses, and all that describes the forests.
     """
-    graph = Graph(
-        borrowed(held.residual), borrowed(held.excess), borrowed(held.key), borrowed(held.mark), borrowed(held.open),
-        borrowed(held.chain), borrowed(held.lists), borrowed(held.turn), borrowed(held.links),
-    )  # fmt: skip
     turn = graph.turn
     sinks = _plant(graph)
-    planted, total = False, np.int64(0)
+    planted, total = False, int64(0)
     while turn[HEAD] < turn[TAIL]:
         there = turn[TAIL + 1] if planted else min(sinks, graph.key.shape[0] - sinks)
         side = 1 if there > 0 and turn[EFFORT + 1] + there < turn[EFFORT] + turn[TAIL] else 0
@@ -142,7 +139,7 @@ def _gather(graph: Graph, sinks: Int, pixels: Int) -> None:
     for v in range(key.shape[0]):
         if key[v] == 0 and _nearest(graph, v, T, T, pixels) == 1:
             key[v] = -2
-            _enqueue(graph, v, T, np.int64(2))
+            _enqueue(graph, v, T, int64(2))
     _advance(graph, T)
 
 
@@ -198,7 +195,7 @@ def _scan(graph: Graph, side: Int, pixels: Int) -> None:
     sign, top = 1 - 2 * side, turn[LEVEL + side]
     turn[EFFORT + side] += turn[TAIL + side]
     while turn[HEAD + side] < turn[TAIL + side]:
-        v = np.int64(graph.lists[turn[QUEUE + side] + turn[HEAD + side]])
+        v = int64(graph.lists[turn[QUEUE + side] + turn[HEAD + side]])
         turn[HEAD + side] += 1
         mark[v] &= 255 - (FOREST << side)
         if key[v] != sign * top:
@@ -206,7 +203,7 @@ def _scan(graph: Graph, side: Int, pixels: Int) -> None:
                 _enqueue(graph, v, side, top + 1)
             continue
         met = _grown(graph, v, side, top + 1, pixels)
-        link, end = np.int64(8), _end(graph, v, pixels)
+        link, end = int64(8), _end(graph, v, pixels)
         while True:
             if met != 0:
                 j = lowest(met)
@@ -234,13 +231,13 @@ def _grown(graph: Graph, v: Int, side: Int, level: Int, pixels: Int) -> Int:
     """Let the free neighbours of a pixel hang by it; return the arcs to the other forest, as bits."""
     key, sign = graph.key, 1 - 2 * side
     if v >= pixels:
-        return np.int64(0)
-    free, other = np.int64(0), np.int64(0)
+        return int64(0)
+    free, other = int64(0), int64(0)
     for j in range(8):
         found = key[v + graph.turn[OFFSETS + j]] * sign
-        free |= np.int64(found == 0) << j
-        other |= np.int64(found < 0) << j
-    way = np.int64(graph.open[v]) >> (8 * side)
+        free |= int64(found == 0) << j
+        other |= int64(found < 0) << j
+    way = int64(graph.open[v]) >> (8 * side)
     free &= way
     while free != 0:
         j = lowest(free)
@@ -258,7 +255,7 @@ def _augment(graph: Graph, v: Int, j: Int, u: Int, side: Int, pixels: Int) -> In
     _, there, back = _arc(graph, v, j, pixels)
     ahead, behind = (there, back) if side == 0 else (back, there)
     giver, taker = (v, u) if side == 0 else (u, v)
-    whole = np.int64(graph.residual[ahead])
+    whole = int64(graph.residual[ahead])
     while whole > 0:
         flow = _borne(graph, giver, S, whole, pixels)
         if flow == 0:
@@ -266,7 +263,7 @@ def _augment(graph: Graph, v: Int, j: Int, u: Int, side: Int, pixels: Int) -> In
         _push(graph, giver, S, flow, pixels)
         whole -= flow
         graph.residual[ahead] = whole
-        turned = np.int64(graph.residual[behind])
+        turned = int64(graph.residual[behind])
         graph.residual[behind] = turned + flow
         if v < pixels and j < 8:
             if whole == 0:
@@ -280,14 +277,14 @@ def _augment(graph: Graph, v: Int, j: Int, u: Int, side: Int, pixels: Int) -> In
 @part
 def _receive(graph: Graph, v: Int, flow: Int) -> Int:
     """Let flow arrive at a node of T, to be passed on by `_drained`; return how much of its deficit that fills."""
-    excess = np.int64(graph.excess[v])
+    excess = int64(graph.excess[v])
     graph.excess[v] = excess + flow
     if excess + flow >= 0 and (excess < 0 or (excess == 0 and (graph.mark[v] & CODE) != ROOT)):
-        level = min(np.int64(-graph.key[v]), graph.turn[LAST])
+        level = min(int64(-graph.key[v]), graph.turn[LAST])
         graph.chain[v] = graph.lists[graph.turn[HEADS] + level]
         graph.lists[graph.turn[HEADS] + level] = v
         graph.turn[HIGHEST] = max(graph.turn[HIGHEST], level)
-    return min(flow, -excess) if excess < 0 else np.int64(0)
+    return min(flow, -excess) if excess < 0 else int64(0)
 
 
 @part
@@ -306,11 +303,11 @@ def _drained(graph: Graph, pixels: Int) -> Int:
             level -= 1
             continue
         v = _farthest(graph, level)
-        left = np.int64(graph.excess[v])
+        left = int64(graph.excess[v])
         if (mark[v] & CODE) == ROOT:
             _detach(graph, v, T)
         while left > 0:
-            code = np.int64(mark[v] & CODE)
+            code = int64(mark[v] & CODE)
             if code >= NONE:
                 if _adopted(graph, v, T, pixels):
                     continue
@@ -318,7 +315,7 @@ def _drained(graph: Graph, pixels: Int) -> Int:
                 mark[v] = (mark[v] & (255 - CODE)) | DEAD
                 break
             up, back, there = _parent(graph, v, pixels)
-            room, turned = np.int64(residual[there]), np.int64(residual[back])
+            room, turned = int64(residual[there]), int64(residual[back])
             flow = min(left, room)
             residual[there], residual[back] = room - flow, turned + flow
             left -= flow
@@ -337,13 +334,13 @@ def _drained(graph: Graph, pixels: Int) -> Int:
 def _farthest(graph: Graph, bucket: Int) -> Int:
     """Take a node out of a bucket; in the last one, which holds all that is farther, one of the farthest level."""
     lists, chain, key, head = graph.lists, graph.chain, graph.key, graph.turn[HEADS] + bucket
-    v, before = np.int64(lists[head]), np.int64(-1)
+    v, before = int64(lists[head]), int64(-1)
     if bucket == graph.turn[LAST]:
-        last, u = v, np.int64(chain[v])
+        last, u = v, int64(chain[v])
         while u >= 0:
             if key[u] < key[v]:
                 v, before = u, last
-            last, u = u, np.int64(chain[u])
+            last, u = u, int64(chain[u])
     if before < 0:
         lists[head] = chain[v]
     else:
@@ -358,18 +355,18 @@ def _borne(graph: Graph, end: Int, side: Int, most: Int, pixels: Int) -> Int:
     Orphans on the way get another parent of the same level, or are dead: then the one before is an orphan.
     """
     mark, lists, path = graph.mark, graph.lists, graph.turn[WORK]
-    v, least, depth = np.int64(end), np.int64(most), np.int64(0)
+    v, least, depth = int64(end), int64(most), int64(0)
     whole = False
     while not whole:
         whole = True
-        v, least, depth = np.int64(end), np.int64(most), np.int64(0)
+        v, least, depth = int64(end), int64(most), int64(0)
         code = mark[v] & CODE
         while code != ROOT:
             if code < NONE:
                 up, down, rise = _parent(graph, v, pixels)
                 code = mark[up] & CODE
                 if code != DEAD:
-                    least = min(least, np.int64(graph.residual[down if side == 0 else rise]))
+                    least = min(least, int64(graph.residual[down if side == 0 else rise]))
                     lists[path + depth] = v
                     depth += 1
                     v = up
@@ -381,12 +378,12 @@ def _borne(graph: Graph, end: Int, side: Int, most: Int, pixels: Int) -> Int:
                 continue
             mark[v] = (mark[v] & (255 - CODE)) | DEAD
             if depth == 0:
-                return np.int64(0)
+                return int64(0)
             depth -= 1
-            v = np.int64(lists[path + depth])
+            v = int64(lists[path + depth])
             _detach(graph, v, side)
             code = NONE
-    excess = np.int64(graph.excess[v])
+    excess = int64(graph.excess[v])
     return min(least, excess if side == 0 else -excess)
 
 
@@ -394,12 +391,12 @@ def _borne(graph: Graph, end: Int, side: Int, most: Int, pixels: Int) -> Int:
 def _push(graph: Graph, end: Int, side: Int, flow: Int, pixels: Int) -> None:
     """Push flow along the way to the root; where an arc is full now, or the root empty, there is an orphan."""
     residual = graph.residual
-    v = np.int64(end)
-    code = np.int64(graph.mark[v] & CODE)
+    v = int64(end)
+    code = int64(graph.mark[v] & CODE)
     while code != ROOT:
         up, down, rise = _parent(graph, v, pixels)
         full, other = (down, rise) if side == 0 else (rise, down)
-        left, turned = np.int64(residual[full]) - flow, np.int64(residual[other])
+        left, turned = int64(residual[full]) - flow, int64(residual[other])
         residual[full] = left
         residual[other] = turned + flow
         if left == 0:
@@ -409,8 +406,8 @@ def _push(graph: Graph, end: Int, side: Int, flow: Int, pixels: Int) -> None:
         if turned == 0 and code < ROOT:
             _opened(graph, v, up, code, side)
         v = up
-        code = np.int64(graph.mark[v] & CODE)
-    left = np.int64(graph.excess[v]) - (flow if side == 0 else -flow)
+        code = int64(graph.mark[v] & CODE)
+    left = int64(graph.excess[v]) - (flow if side == 0 else -flow)
     graph.excess[v] = left
     if left == 0:
         _detach(graph, v, side)
@@ -438,10 +435,10 @@ def _adopted(graph: Graph, v: Int, side: Int, pixels: Int) -> Int:
     if wanted == 0:
         return False
     if v < pixels:
-        some = np.int64(0)
+        some = int64(0)
         for j in range(8):
-            some |= np.int64(key[v + graph.turn[OFFSETS + j]] == wanted) << j
-        some &= np.int64(graph.open[v]) >> (8 * (1 - side))
+            some |= int64(key[v + graph.turn[OFFSETS + j]] == wanted) << j
+        some &= int64(graph.open[v]) >> (8 * (1 - side))
         while some != 0:
             j = lowest(some)
             some &= some - 1
@@ -449,7 +446,7 @@ def _adopted(graph: Graph, v: Int, side: Int, pixels: Int) -> Int:
                 mark[v] = (mark[v] & (255 - CODE)) | j
                 return True
     for j in range(
-        8 if v < pixels else np.int64(graph.links[graph.turn[CURRENT] + v - pixels]), _end(graph, v, pixels)
+        8 if v < pixels else int64(graph.links[graph.turn[CURRENT] + v - pixels]), _end(graph, v, pixels)
     ):
         u, there, back = _arc(graph, v, j, pixels)
         if key[u] == wanted and (mark[u] & CODE) != DEAD and graph.residual[back if side == 0 else there] > 0:
@@ -478,7 +475,7 @@ def _detached(graph: Graph, side: Int, root: Int, pixels: Int) -> Int:
     Those of T that hold an excess become roots of S at the level `root`, which is that of its border.
     """
     key, mark, turn = graph.key, graph.mark, graph.turn
-    sign, lost = 1 - 2 * side, np.int64(-1)
+    sign, lost = 1 - 2 * side, int64(-1)
     while turn[ORPHANS + side] >= 0:
         v = turn[ORPHANS + side]
         turn[ORPHANS + side] = graph.chain[v]
@@ -500,9 +497,9 @@ def _detached(graph: Graph, side: Int, root: Int, pixels: Int) -> Int:
             graph.chain[v], lost = lost, v
         turn[EFFORT + side] += WEIGHT
         if v < pixels:
-            some = np.int64(0)
+            some = int64(0)
             for j in range(8):
-                some |= np.int64(key[v + graph.turn[OFFSETS + j]] == after) << j
+                some |= int64(key[v + graph.turn[OFFSETS + j]] == after) << j
             while some != 0:
                 j = lowest(some)
                 some &= some - 1
@@ -522,11 +519,11 @@ def _settle(graph: Graph, side: Int, top: Int, lost: Int, pixels: Int) -> None:
     sign, work, heads, far = 1 - 2 * side, turn[WORK], turn[HEADS], turn[LAST]
     if top == 1:
         return
-    base, waiting = np.int64(2), 0
-    v = np.int64(lost)
+    base, waiting = int64(2), 0
+    v = int64(lost)
     while v >= 0:
-        after = np.int64(chain[v])
-        level = _nearest(graph, v, side, np.int64(lists[work + v]), pixels) + 1 if lists[work + v] < top else NEVER
+        after = int64(chain[v])
+        level = _nearest(graph, v, side, int64(lists[work + v]), pixels) + 1 if lists[work + v] < top else NEVER
         if level <= top:
             key[v] = sign * (FAR + level)
             place = min(level - base, far)
@@ -534,30 +531,30 @@ def _settle(graph: Graph, side: Int, top: Int, lost: Int, pixels: Int) -> None:
             lists[heads + place] = v
             waiting += 1
         v = after
-    level, begin, end = base, np.int64(0), np.int64(0)
+    level, begin, end = base, int64(0), int64(0)
     while waiting > 0 or begin < end:
         if level - base == far:  # the last bucket holds all that is farther
-            v = np.int64(lists[heads + far])
+            v = int64(lists[heads + far])
             lists[heads + far] = -1
             base = level
             while v >= 0:
-                after = np.int64(chain[v])
+                after = int64(chain[v])
                 place = min(max(key[v] * sign - FAR - base, 0), far)
                 chain[v] = lists[heads + place]
                 lists[heads + place] = v
                 v = after
         stop = end
-        v = np.int64(lists[heads + level - base])
+        v = int64(lists[heads + level - base])
         lists[heads + level - base] = -1
         while v >= 0 or begin < stop:
             if v >= 0:
                 settled = v
-                v = np.int64(chain[v])
+                v = int64(chain[v])
                 waiting -= 1
                 if key[settled] * sign != FAR + level:
                     continue
             else:
-                settled = np.int64(lists[work + begin])
+                settled = int64(lists[work + begin])
                 begin += 1
             key[settled] = sign * level
             _enqueue(graph, settled, side, level)
@@ -572,11 +569,11 @@ def _offered(graph: Graph, v: Int, side: Int, level: Int, end: Int, pixels: Int)
     key, lists, work = graph.key, graph.lists, graph.turn[WORK]
     sign = 1 - 2 * side
     if v < pixels:
-        some = np.int64(0)
+        some = int64(0)
         for j in range(8):
             found = key[v + graph.turn[OFFSETS + j]] * sign
-            some |= np.int64((found == 0) | (found > FAR + level)) << j
-        some &= (np.int64(graph.open[v]) >> (8 * side)) & 255
+            some |= int64((found == 0) | (found > FAR + level)) << j
+        some &= (int64(graph.open[v]) >> (8 * side)) & 255
         while some != 0:
             j = lowest(some)
             some &= some - 1
@@ -603,13 +600,13 @@ def _nearest(graph: Graph, v: Int, side: Int, least: Int, pixels: Int) -> Int:
     None is below `least`.
     """
     key, sign = graph.key, 1 - 2 * side
-    best = np.int64(NEVER)
+    best = int64(NEVER)
     if v < pixels:
-        way = np.int64(graph.open[v]) >> (8 * (1 - side))
+        way = int64(graph.open[v]) >> (8 * (1 - side))
         for j in range(8):
-            level = np.int64(key[v + graph.turn[OFFSETS + j]] * sign)
+            level = int64(key[v + graph.turn[OFFSETS + j]] * sign)
             good = ((way >> j) & 1) != 0 and level > 0 and level < FAR
-            best = min(best, level * 8 + j if good else np.int64(NEVER))
+            best = min(best, level * 8 + j if good else int64(NEVER))
         if best < NEVER:
             graph.mark[v] = (graph.mark[v] & (255 - CODE)) | (best & 7)
             best >>= 3
@@ -618,7 +615,7 @@ def _nearest(graph: Graph, v: Int, side: Int, least: Int, pixels: Int) -> Int:
         by = end
         for j in range(8, end):
             u, there, back = _arc(graph, v, j, pixels)
-            level = np.int64(key[u]) * sign
+            level = int64(key[u]) * sign
             if level > 0 and level < min(best, FAR) and graph.residual[back if side == 0 else there] > 0:
                 best, by = level, j
         if by < end:
@@ -641,7 +638,7 @@ def _rank(graph: Graph, pixel: Int) -> Int:
     left = (left & np.uint64(0x33333333)) + ((left >> np.uint64(2)) & np.uint64(0x33333333))
     left = (left + (left >> np.uint64(4))) & np.uint64(0x0F0F0F0F)
     left = ((left * np.uint64(0x01010101)) >> np.uint64(24)) & np.uint64(255)
-    return np.int64(graph.links[graph.turn[RANKS] + (pixel >> 5)]) + np.int64(left)
+    return int64(graph.links[graph.turn[RANKS] + (pixel >> 5)]) + int64(left)
 
 
 @part
@@ -650,25 +647,21 @@ def _end(graph: Graph, v: Int, pixels: Int) -> Int:
     if v >= pixels:
         return (
             8
-            + np.int64(graph.links[graph.turn[FIRST] + v - pixels + 1])
-            - np.int64(graph.links[graph.turn[FIRST] + v - pixels])
+            + int64(graph.links[graph.turn[FIRST] + v - pixels + 1])
+            - int64(graph.links[graph.turn[FIRST] + v - pixels])
         )
     if not graph.mark[v] & LINKED:
-        return np.int64(8)
+        return int64(8)
     place = _rank(graph, v)
-    return (
-        8
-        + np.int64(graph.links[graph.turn[BEGINS] + place + 1])
-        - np.int64(graph.links[graph.turn[BEGINS] + place])
-    )
+    return 8 + int64(graph.links[graph.turn[BEGINS] + place + 1]) - int64(graph.links[graph.turn[BEGINS] + place])
 
 
 @part
 def _link(graph: Graph, v: Int, j: Int, pixels: Int) -> Int:
     """Return the link that is a node's arc j."""
     if v >= pixels:
-        return np.int64(graph.links[graph.turn[FIRST] + v - pixels]) + j - 8
-    return np.int64(graph.links[graph.turn[WAYS] + graph.links[graph.turn[BEGINS] + _rank(graph, v)] + j - 8])
+        return int64(graph.links[graph.turn[FIRST] + v - pixels]) + j - 8
+    return int64(graph.links[graph.turn[WAYS] + graph.links[graph.turn[BEGINS] + _rank(graph, v)] + j - 8])
 
 
 @part
@@ -680,22 +673,22 @@ def _arc(graph: Graph, v: Int, j: Int, pixels: Int) -> tuple[Int, Int, Int]:
     link = _link(graph, v, j, pixels)
     place = pixels * 8 + 2 * link
     if v < pixels:
-        return np.int64(graph.links[graph.turn[NODE] + link]), place + 1, place
-    return np.int64(graph.links[graph.turn[PIXEL] + link]), place, place + 1
+        return int64(graph.links[graph.turn[NODE] + link]), place + 1, place
+    return int64(graph.links[graph.turn[PIXEL] + link]), place, place + 1
 
 
 @part
 def _parent(graph: Graph, v: Int, pixels: Int) -> tuple[Int, Int, Int]:
     """Return a node's parent, and where the capacities from it and to it stand."""
-    code = np.int64(graph.mark[v] & CODE)
+    code = int64(graph.mark[v] & CODE)
     if code < ROOT:
         u = v + graph.turn[OFFSETS + code]
         return u, u * 8 + (code ^ 1), v * 8 + code
     if v < pixels:
-        link = np.int64(graph.links[graph.turn[VIA] + _rank(graph, v)])
-        return np.int64(graph.links[graph.turn[NODE] + link]), pixels * 8 + 2 * link, pixels * 8 + 2 * link + 1
-    link = np.int64(graph.links[graph.turn[HANGS] + v - pixels])
-    return np.int64(graph.links[graph.turn[PIXEL] + link]), pixels * 8 + 2 * link + 1, pixels * 8 + 2 * link
+        link = int64(graph.links[graph.turn[VIA] + _rank(graph, v)])
+        return int64(graph.links[graph.turn[NODE] + link]), pixels * 8 + 2 * link, pixels * 8 + 2 * link + 1
+    link = int64(graph.links[graph.turn[HANGS] + v - pixels])
+    return int64(graph.links[graph.turn[PIXEL] + link]), pixels * 8 + 2 * link + 1, pixels * 8 + 2 * link
 
 
 @part
