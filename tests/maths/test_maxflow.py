@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from perdure.errors import ParameterError
-from perdure.maths.kernels import ibfs
+from perdure.maths.kernels import capacities, ibfs
 from perdure.maths.kernels.ibfs import Graph, solve
 from perdure.maths.kernels.ibfs_twin import solve_twin
 from perdure.maths.maxflow import Nodes, Workspace, cut, energy, margins, nodes_of, recut
@@ -109,6 +109,15 @@ def test_nothing_flows_where_there_is_no_source_no_sink_or_no_edge(shape: tuple[
     rng = np.random.default_rng(0)
     apart = rng.integers(-3, 4, shape).astype(float)
     assert (cut(apart, free).labels == (apart < 0)).all()
+
+
+def test_the_largest_costs_there_may_be_gather_nowhere_beyond_32_bits():
+    largest = float(capacities.MOST)
+    costs = np.full((6, 6), -largest)
+    costs[2:4, 2:4] = largest
+    found = cut(costs, np.full((4, 6, 6), largest), scale=SCALE_1)
+    assert found.energy == (4 - 32) * largest
+    assert found.labels.all()
 
 
 def test_an_edge_is_filled_to_the_last_unit():

@@ -259,14 +259,14 @@ class Workspace:
         height, width = unary.shape
         self._reserve((height, width, 2 * len(pairwise)), len(nodes.unary), len(nodes.pixels))
         graph = self._graph
-        below, good = capacities.fill(unary, pairwise, scale, graph.residual, graph.excess, graph.open, width + 1)
+        below, good = capacities.fill(unary, pairwise, scale, graph.residual, graph.excess, width + 1)
         if not good:
             _refuse(unary, pairwise, domain, scale)
         self._scale, self._nodes = scale, len(nodes.unary)
         self._domain = None if domain is None else np.array(domain, order="C")
         self._join(nodes, width)
         if self._domain is not None:
-            below -= capacities.forbid(self._domain, graph.residual, graph.excess, graph.open, width + 1)
+            below -= capacities.forbid(self._domain, graph.residual, graph.excess, width + 1)
             self._forbid_links(nodes, self._domain)
         wholes = _wholes(nodes.unary, scale, "nodes.unary", signed=True)
         places = self._pixels + np.arange(len(wholes))

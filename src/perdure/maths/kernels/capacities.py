@@ -11,7 +11,6 @@ from perdure.maths.kernels.compile import changed, given, kernel_for
 
 Float = NDArray[np.float64]
 Ints = NDArray[np.int32]
-Ways = NDArray[np.uint16]
 
 MOST = 2**29 - 1  # an arc holds up to twice its capacity, an excess what is added to it later
 
@@ -22,11 +21,10 @@ MOST = 2**29 - 1  # an arc holds up to twice its capacity, an excess what is add
     float,
     changed(np.int32),
     changed(np.int32),
-    changed(np.uint16),
     int,
 )
 def fill(
-    unary: Float, pairwise: Float, scale: float, residual: Ints, excess: Ints, way: Ways, width: int
+    unary: Float, pairwise: Float, scale: float, residual: Ints, excess: Ints, width: int
 ) -> tuple[int, bool]:
     """Write capacities of arcs and excesses of pixels; return the sum of the unaries below 0, and whether all fit.
 
@@ -36,15 +34,13 @@ def fill(
         D is 4 or 8: weights to the neighbours E, S, SE, SW. Weights of edges that leave the picture are not read.
     scale : float
         Capacities a unit of weight.
-    residual, excess, way : (≥ P * 8,), (≥ P,) int32, (≥ P,) uint16, changed
+    residual, excess : (≥ P * 8,), (≥ P,) int32, changed
         Of a grid with a border; only what lies in the picture is written.
     width : int
         Pixels from a row of the grid to the next.
     """
     height, wide = unary.shape
     below, good = 0, True
-    for pixel in range(way.shape[0]):
-        way[pixel] = 0
     for y in range(height):
         row = (y + 1) * width + 1
         for x in range(wide):
@@ -65,21 +61,15 @@ def fill(
                 value = pairwise[d, y, x] * scale
                 fits = value >= 0.0 and value <= MOST
                 good = good and fits
-                whole = int(value + 0.5) if fits else 0
+                capacity = np.int32(value + 0.5) if fits else np.int32(0)
                 place = (row + x) * 8 + 2 * d
-                residual[place] = whole
-                residual[place + back] = whole
-            for x in range(begin, end):  # bits of both pixels, there and back
-                way[row + x] |= np.uint16(257 << (2 * d)) if pairwise[d, y, x] * scale >= 0.5 else np.uint16(0)
-            for x in range(begin, end):
-                way[row + x + back // 8] |= (
-                    np.uint16(257 << (2 * d + 1)) if pairwise[d, y, x] * scale >= 0.5 else np.uint16(0)
-                )
+                residual[place] = capacity
+                residual[place + back] = capacity
     return below, good
 
 
-@kernel_for(given(np.bool_, 2, "C"), changed(np.int32), changed(np.int32), changed(np.uint16), int)
-def forbid(domain: NDArray[np.bool_], residual: Ints, excess: Ints, way: Ways, width: int) -> int:
+@kernel_for(given(np.bool_, 2, "C"), changed(np.int32), changed(np.int32), int)
+def forbid(domain: NDArray[np.bool_], residual: Ints, excess: Ints, width: int) -> int:
     """Take the pixels outside a domain (H, W) out of the problem; return the sum of their unaries below 0."""
     offsets = (1, -1, width, -width, width + 1, -width - 1, width - 1, -width + 1)
     below = 0
@@ -92,8 +82,6 @@ def forbid(domain: NDArray[np.bool_], residual: Ints, excess: Ints, way: Ways, w
             excess[pixel] = 0
             for j in range(8):
                 residual[pixel * 8 + j] = residual[(pixel + offsets[j]) * 8 + (j ^ 1)] = 0
-                way[pixel + offsets[j]] &= 65535 - (257 << (j ^ 1))
-            way[pixel] = 0
     return below
 
 

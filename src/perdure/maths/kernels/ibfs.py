@@ -14,7 +14,7 @@ side, E W S N SE NW SW NE, so that the arc back from the neighbour in direction 
 are there, with no capacity. Which arcs are open, there and back, are 16 bits: most questions are about the neighbours'
 levels and these. (4) Terminals are one number a node, its excess (> 0: from the source, < 0: to the sink). Pushing
 along a path changes the excess of its ends, and what is left is an equivalent problem, so that excesses may be changed
-between two solutions.
+between two solutions. (5) Before any search two passes over the pixels push what neighbours take: most of the flow.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ Ints = NDArray[np.int32]
 Int = Any  # a Python int or one of NumPy's: to Numba they are the same
 
 int64 = np.int64
+at = np.uint64  # a place in an array that is not below 0: Numba does not ask
 S, T = int64(0), int64(1)  # the sides
 ROOT, LINK, NONE, DEAD = 8, 9, 10, 11  # how a node hangs; below 8: by its arc in that direction
 CODE, FOREST, LINKED, LISTED = 15, 16, 64, 128  # bits of a mark; FOREST << side: is in that side's queue
 FAR = 1 << 29  # added to a level that is not yet final
 NEVER = 1 << 40
 BUCKETS = 1024
+MOST = 2**29 - 1  # that is gathered at a pixel
 WEIGHT = 2  # of a node out of the forest beside one to be scanned
 # Places in `turn`. First what changes, for both sides: + side.
 LEVEL, HEAD, TAIL, NEXT, ORPHANS, EFFORT, HIGHEST, FILLED = 0, 2, 4, 6, 8, 10, 12, 13
@@ -80,8 +82,9 @@ def solve(graph: Graph, pixels: Int) -> Int:
     Changed: residuals, excesses, and all that describes the forests.
     """
     turn = graph.turn
-    sinks = _plant(graph)
-    planted, total = False, int64(0)
+    total = _swept(graph, pixels)
+    sinks = _plant(graph, pixels)
+    planted = False
     while turn[HEAD] < turn[TAIL]:
         there = turn[TAIL + 1] if planted else min(sinks, graph.key.shape[0] - sinks)
         side = 1 if there > 0 and turn[EFFORT + 1] + there < turn[EFFORT] + turn[TAIL] else 0
@@ -100,9 +103,55 @@ def solve(graph: Graph, pixels: Int) -> Int:
 
 
 @part
-def _plant(graph: Graph) -> Int:
-    """Make every node with an excess or a deficit a root; list those of S, return how many T has."""
+def _swept(graph: Graph, pixels: Int) -> Int:
+    """Push the excess of each pixel in turn to E, S, SE and SW, then from the last to the first to W, N, NW and NE.
+
+    Most of the flow finds its way so; return how much arrives. An excess that finds no way may be anywhere.
+    """
+    residual, excess, turn = graph.residual, graph.excess, graph.turn
+    total: Int = int64(0)
+    for back in range(2):
+        for place in range(pixels):
+            v = pixels - 1 - place if back else place
+            left = int64(excess[at(v)])
+            j = back
+            while left > 0 and j < 8:
+                u = v + turn[OFFSETS + j]
+                before = int64(excess[at(u)])
+                flow = min(left, int64(residual[at(v * 8 + j)]), MOST - before)
+                if flow > 0:
+                    residual[v * 8 + j] -= flow
+                    residual[u * 8 + (j ^ 1)] += flow
+                    excess[u] = before + flow
+                    excess[v] = left - flow
+                    left -= flow
+                    total += min(flow, max(-before, 0))
+                j += 2
+    return total
+
+
+@part
+def _plant(graph: Graph, pixels: Int) -> Int:
+    """Make every node with an excess or a deficit a root; list those of S, return how many T has. Note open arcs."""
     key, mark, turn = graph.key, graph.mark, graph.turn
+    residual, low, row = graph.residual, graph.chain, turn[OFFSETS + 2]
+    for v in range(pixels):
+        way: Int = int64(0)
+        for j in range(8):
+            way |= int64(residual[at(v * 8 + j)] > 0) << j
+        low[v] = way
+    for v in range(row + 1, pixels - row - 1):
+        graph.open[v] = (
+            low[v]
+            | ((low[at(v + 1)] >> 1 & 1) << 8)
+            | ((low[at(v - 1)] & 1) << 9)
+            | ((low[at(v + row)] >> 3 & 1) << 10)
+            | ((low[at(v - row)] >> 2 & 1) << 11)
+            | ((low[at(v + row + 1)] >> 5 & 1) << 12)
+            | ((low[at(v - row - 1)] >> 4 & 1) << 13)
+            | ((low[at(v + row - 1)] >> 7 & 1) << 14)
+            | ((low[at(v - row + 1)] >> 6 & 1) << 15)
+        )
     sinks = 0
     for v in range(key.shape[0]):
         excess = graph.excess[v]
@@ -234,7 +283,7 @@ def _grown(graph: Graph, v: Int, side: Int, level: Int, pixels: Int) -> Int:
         return int64(0)
     free, other = int64(0), int64(0)
     for j in range(8):
-        found = key[v + graph.turn[OFFSETS + j]] * sign
+        found = key[at(v + graph.turn[OFFSETS + j])] * sign
         free |= int64(found == 0) << j
         other |= int64(found < 0) << j
     way = int64(graph.open[v]) >> (8 * side)
@@ -437,7 +486,7 @@ def _adopted(graph: Graph, v: Int, side: Int, pixels: Int) -> Int:
     if v < pixels:
         some = int64(0)
         for j in range(8):
-            some |= int64(key[v + graph.turn[OFFSETS + j]] == wanted) << j
+            some |= int64(key[at(v + graph.turn[OFFSETS + j])] == wanted) << j
         some &= int64(graph.open[v]) >> (8 * (1 - side))
         while some != 0:
             j = lowest(some)
@@ -499,7 +548,7 @@ def _detached(graph: Graph, side: Int, root: Int, pixels: Int) -> Int:
         if v < pixels:
             some = int64(0)
             for j in range(8):
-                some |= int64(key[v + graph.turn[OFFSETS + j]] == after) << j
+                some |= int64(key[at(v + graph.turn[OFFSETS + j])] == after) << j
             while some != 0:
                 j = lowest(some)
                 some &= some - 1
@@ -571,7 +620,7 @@ def _offered(graph: Graph, v: Int, side: Int, level: Int, end: Int, pixels: Int)
     if v < pixels:
         some = int64(0)
         for j in range(8):
-            found = key[v + graph.turn[OFFSETS + j]] * sign
+            found = key[at(v + graph.turn[OFFSETS + j])] * sign
             some |= int64((found == 0) | (found > FAR + level)) << j
         some &= (int64(graph.open[v]) >> (8 * side)) & 255
         while some != 0:
@@ -604,7 +653,7 @@ def _nearest(graph: Graph, v: Int, side: Int, least: Int, pixels: Int) -> Int:
     if v < pixels:
         way = int64(graph.open[v]) >> (8 * (1 - side))
         for j in range(8):
-            level = int64(key[v + graph.turn[OFFSETS + j]] * sign)
+            level = int64(key[at(v + graph.turn[OFFSETS + j])] * sign)
             good = ((way >> j) & 1) != 0 and level > 0 and level < FAR
             best = min(best, level * 8 + j if good else int64(NEVER))
         if best < NEVER:
