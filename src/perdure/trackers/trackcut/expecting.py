@@ -18,6 +18,7 @@ from perdure.trackers.trackcut.windows import Window, around
 
 Float = NDArray[np.float32]
 Bits = NDArray[np.bool_]
+Similarity = tuple[NDArray[np.float64], tuple[float, float]]
 _CORE = 1.0  # cells from the edge, from which flow is the object's own
 _ENOUGH = 30  # cells of core
 _MARGIN = 2.0  # cells by which the remembered silhouette counts for less than the last one
@@ -90,30 +91,14 @@ def expect(
     weights : Weights
         Of the evidence.
     """
-    height, width = sight.colours.shape[:2]
     drift = carried(target, motion)
-    x1, y1, x2, y2 = target.shape.box
-    boxes = [(x1 + drift[0], y1 + drift[1], x2 + drift[0], y2 + drift[1])]
-    if target.mask.area:
-        a1, b1, a2, b2 = target.mask.box
-        boxes.append((a1 + drift[0], b1 + drift[1], a2 + drift[0], b2 + drift[1]))
-    window = around(boxes, ring, cells, (height, width))
+    window = _window(target, drift, ring, cells, sight)
     x, y = window.places()
     flow = motion.at(window)  # (h, w, 2)
     camera = motion.of_camera(x, y)
     came = np.stack([x - flow[..., 0], y - flow[..., 1]], axis=2)  # where each cell was
     last = _carry_mask(target, window, came)
-    core = depth(last) > _CORE
-    if core.sum() > _ENOUGH and not target.partly:
-        move = similarity(x[core], y[core], flow[core])
-        moved = move[0][:2] - camera[core].mean(axis=0)
-    else:
-        middle = middle_of(target)
-        move = (
-            np.array([drift[0], drift[1], 0.0, 0.0]),
-            (middle[0] + float(drift[0]), middle[1] + float(drift[1])),
-        )
-        moved = recent_motion(target)
+    move, moved = _movement(target, drift, (x, y), flow, camera, depth(last) > _CORE)
     belief = in_window(target.shape, window, move)
     whole = belief > 0.5
     lost = last.sum() < _HALF * whole.sum()
@@ -132,6 +117,27 @@ def expect(
     shape = np.clip(away / slope, -_SURE, _SURE)
     evidence = weights.colour * looks + weights.place * votes + weights.motion * motions + weights.shape * shape
     return Expected(window, colours.astype(np.float32), last, belief, predicted, moved, -evidence)
+
+
+def _window(target: Target, drift: NDArray[np.float64], ring: float, cells: int, sight: Sight) -> Window:
+    """The window round where the object should be."""
+    boxes = [target.shape.box, *([target.mask.box] if target.mask.area else [])]
+    dx, dy = drift.tolist()
+    moved = [(x1 + dx, y1 + dy, x2 + dx, y2 + dy) for x1, y1, x2, y2 in boxes]
+    height, width = sight.colours.shape[:2]
+    return around(moved, ring, cells, (height, width))
+
+
+def _movement(
+    target: Target, drift: NDArray[np.float64], at: tuple[Float, Float], flow: Float, camera: Float, core: Bits
+) -> tuple[Similarity, NDArray[np.float64]]:
+    """How the object has moved: a similarity, and (2,) px beyond the camera's; as before where little of it is seen."""
+    if core.sum() > _ENOUGH and not target.partly:
+        move = similarity(at[0][core], at[1][core], flow[core])
+        return move, np.asarray(move[0][:2] - camera[core].mean(axis=0), np.float64)
+    x, y = middle_of(target)
+    move = (np.array([drift[0], drift[1], 0.0, 0.0]), (x + float(drift[0]), y + float(drift[1])))
+    return move, recent_motion(target)
 
 
 def _carry_mask(target: Target, window: Window, came: Float) -> Bits:

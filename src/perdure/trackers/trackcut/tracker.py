@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.masks import disjoint, holding
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
 from perdure.trackers.trackcut.cutting import Observed, contrast, cut_out, touching
 from perdure.trackers.trackcut.expecting import Expected, Weights, expect
 from perdure.trackers.trackcut.likelihoods import learn_colours, of_colours
+from perdure.trackers.trackcut.saying import gone, happenings, has_left, rows_of
 from perdure.trackers.trackcut.seeing import Motion, Sight, look_at, motion_between
 from perdure.trackers.trackcut.separating import clusters, separate
 from perdure.trackers.trackcut.shapes import to_shape
 from perdure.trackers.trackcut.targets import RECENT, Shape, Target
 from perdure.trackers.trackcut.windows import around
-from perdure.types import Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
+from perdure.types import Event, Frame, Mask, Regions, Report, Scene
 
 Float = NDArray[np.float32]
 _GONE = 0.05  # share of its mean size, below which an object is not seen
@@ -111,12 +111,12 @@ class TrackCut:
         next_id = max([state.next_id, *(one.id + 1 for one in born)])
         kept = []
         for one in targets:
-            if one.missed > self.hidden_for + 1e-9 or _has_left(one, state.size):
-                events.append(_gone(one, frame, state.size))
+            if one.missed > self.hidden_for + 1e-9 or has_left(one, state.size):
+                events.append(gone(one, frame, state.size))
             else:
                 kept.append(one)
-        rows = _rows(kept, frame, state.size, self.hidden_for)
-        events += _happenings(state.targets, kept, frame)
+        rows = rows_of(kept, frame, state.size, self.hidden_for)
+        events += happenings(state.targets, kept, frame)
         state = TrackCutState(
             tuple(kept),
             waiting,
@@ -427,70 +427,3 @@ def _overlap(one: Mask, other: Mask) -> int:
         return 0
     first = one.bits[y1 - one.y : y2 - one.y, x1 - one.x : x2 - one.x]
     return int((first & other.bits[y1 - other.y : y2 - other.y, x1 - other.x : x2 - other.x]).sum())
-
-
-def _has_left(target: Target, size: tuple[int, int]) -> bool:
-    """Whether an object that is not seen should be outside the picture."""
-    x1, y1, x2, y2 = target.shape.box
-    x, y = (x1 + x2) / 2, (y1 + y2) / 2
-    return target.missed > 0 and not (0 <= x < size[1] and 0 <= y < size[0])
-
-
-def _gone(target: Target, frame: Frame, size: tuple[int, int]) -> Event:
-    left = _has_left(target, size)
-    why = "over the border" if left else "not seen again inside the picture"
-    return Event("left" if left else "lost", frame.index, frame.index, (target.id,), why=why)
-
-
-def _happenings(before: tuple[Target, ...], now: list[Target], frame: Frame) -> list[Event]:
-    """Return who has become hidden, and who is seen again."""
-    old = {one.key: one for one in before}
-    events = []
-    for one in now:
-        was = old.get(one.key)
-        if was is None:
-            continue
-        if was.missed == 0 < one.missed:
-            events.append(Event("occluded", frame.index, frame.index, (one.id,), why="no pixel of it is seen"))
-        elif was.missed > 0 == one.missed:
-            events.append(
-                Event("found_again", frame.index, frame.index, (one.id,), why="it is seen where it should be")
-            )
-        elif one.partly and not was.partly:
-            events.append(
-                Event("partly_occluded", frame.index, frame.index, (one.id,), why="smaller by more than 3 σ")
-            )
-    return events
-
-
-def _rows(targets: list[Target], frame: Frame, size: tuple[int, int], patience: float) -> Tracks:
-    """The rows of a frame."""
-    if not targets:
-        return Tracks.empty()
-    masks = disjoint([one.mask for one in targets], *size)
-    seen = [one.missed == 0 for one in targets]
-    boxes = [
-        one.shape.box if one.partly or not there else tuple(map(float, mask.box))
-        for one, there, mask in zip(targets, seen, masks, strict=True)
-    ]
-    status = [
-        (Status.PARTLY_OCCLUDED if one.partly else Status.VISIBLE) if there else Status.OCCLUDED
-        for one, there in zip(targets, seen, strict=True)
-    ]
-    hope = [
-        1.0 if there else 0.45 * max(0.0, 1 - one.missed / max(patience, 1e-6))
-        for one, there in zip(targets, seen, strict=True)
-    ]
-    return Tracks.of(
-        frames=frame.index,
-        times=frame.time,
-        ids=[one.id for one in targets],
-        boxes=holding(np.array(boxes, np.float32).reshape(-1, 4), masks),
-        status=[int(one) for one in status],
-        confidence=hope,
-        classes=[one.class_ for one in targets],
-        inferred=[not there for there in seen],
-        masks=masks,
-        believed=[one.shape.to_mask() for one in targets],
-        links=[one.links for one in targets],
-    )
