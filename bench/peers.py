@@ -193,7 +193,9 @@ def chosen(what: str, names: Sequence[str], known: Mapping[str, Any], group: Cal
 
 def runners() -> list[Runner]:
     """Return our trackers at their defaults, then every peer twice."""
-    ours = [Runner(f"perdure/{name}", "defaults", "", None) for name in TRACKERS]
+    ours = [
+        Runner(f"perdure/{name}", "defaults", "", None) for name, made in TRACKERS.items() if not made.needs_pixels
+    ]
     peers = tomllib.loads((HERE / "settings.toml").read_text(encoding="utf-8"))["peer"]
     return ours + [
         Runner(peer["name"], settings, explained(peer[settings]), {"scores_above": None, **peer, **peer[settings]})
