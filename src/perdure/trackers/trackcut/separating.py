@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from perdure.features.masks import mask_shares
 from perdure.maths.expansion import expand
 from perdure.trackers.trackcut.cutting import contrast
 from perdure.trackers.trackcut.shapes import depth, in_window
@@ -23,23 +24,14 @@ _MARGIN = 4.0  # pixels round a cluster
 
 def clusters(masks: list[Mask]) -> list[list[int]]:
     """Return the numbers of masks that hang together by common pixels, of every company of two or more."""
-    company = list(range(len(masks)))
+    company, common = list(range(len(masks))), mask_shares(masks, masks) > 0
     for one in range(len(masks)):
         for other in range(one):
-            if company[one] != company[other] and _common(masks[one], masks[other]):
+            if company[one] != company[other] and common[one, other]:
                 old, new = company[one], company[other]
                 company = [new if number == old else number for number in company]
     found = [[k for k, number in enumerate(company) if number == one] for one in sorted(set(company))]
     return [some for some in found if len(some) > 1]
-
-
-def _common(one: Mask, other: Mask) -> bool:
-    x1, y1 = max(one.box[0], other.box[0]), max(one.box[1], other.box[1])
-    x2, y2 = min(one.box[2], other.box[2]), min(one.box[3], other.box[3])
-    if x1 >= x2 or y1 >= y2:
-        return False
-    first = one.bits[y1 - one.y : y2 - one.y, x1 - one.x : x2 - one.x]
-    return bool((first & other.bits[y1 - other.y : y2 - other.y, x1 - other.x : x2 - other.x]).any())
 
 
 def separate(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from perdure.features.masks import mask_shares
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
 from perdure.trackers.trackcut.cutting import Observed, contrast, cut_out, touching
@@ -24,6 +25,7 @@ from perdure.types import Event, Frame, Mask, Regions, Report, Scene
 Float = NDArray[np.float32]
 _GONE = 0.05  # share of its mean size, below which an object is not seen
 _NEW_COVERED = 0.2  # share of an observation that objects may hold, for it to be a new one
+_SAME = 0.3  # share of an observation that one of the frame before held, for both to be one
 _GAIN, _LOSE = 0.5, 0.25  # by which the remembered silhouette takes up and gives up pixels, a frame
 _HALF_SEEN = 0.75  # share of the remembered silhouette below which it gives up nothing
 _KNOWN = 5  # frames from which a size is known (§3.3)
@@ -307,10 +309,10 @@ class TrackCut:
         next_id = max([state.next_id, *(one.id + 1 for one in targets)])
         for number, mask in enumerate(observations):
             if marks is None:
-                covered = sum(_overlap(mask, one.mask) for one in targets) / max(mask.area, 1)
+                covered = mask_shares([mask], [one.mask for one in targets]).sum()
                 if number in taken or covered >= _NEW_COVERED or mask.area < least:
                     continue
-                if len(state.colours) and not any(_overlap(mask, old) > 0.3 * mask.area for old in state.waiting):
+                if len(state.colours) and not (mask_shares([mask], state.waiting) > _SAME).any():
                     waiting.append(mask)
                     continue
             identity = int(marks[number]) if marks is not None else 0
@@ -417,13 +419,3 @@ def _log_density_of(target: Target) -> Callable[[Float], Float]:
 def _colours_of(sight: Sight, mask: Mask) -> Float:
     x1, y1, x2, y2 = mask.box
     return np.asarray(sight.colours[y1:y2, x1:x2][mask.bits], np.float32)
-
-
-def _overlap(one: Mask, other: Mask) -> int:
-    """Pixels that two masks share."""
-    x1, y1 = max(one.box[0], other.box[0]), max(one.box[1], other.box[1])
-    x2, y2 = min(one.box[2], other.box[2]), min(one.box[3], other.box[3])
-    if x1 >= x2 or y1 >= y2:
-        return 0
-    first = one.bits[y1 - one.y : y2 - one.y, x1 - one.x : x2 - one.x]
-    return int((first & other.bits[y1 - other.y : y2 - other.y, x1 - other.x : x2 - other.x]).sum())
