@@ -1,6 +1,6 @@
 """What the paper of `trackcut` shows, repeated, and what is asked of masks elsewhere.
 
-    python bench/trackcut_paper.py [--parts davis composites speed] [--data DIR] [--draw DIR] [--json] [--write]
+    python bench/trackcut_paper.py [--parts davis composites pets domain speed] [--data DIR] [--draw DIR] [--json] [--write]
 
 davis       six sequences of DAVIS 2016 (val), from the mask of the first frame, at defaults, online. J is the mean
             IoU of mask and truth over all frames but the first and the last, as DAVIS counts. Beside it two baselines
@@ -18,14 +18,21 @@ composites  the paper's 5.1 to 5.3 on drawn-together clips, from pixels, as `per
             id. Silhouettes touch where those of gt/amodal.txt have a common pixel or neighbouring ones. An object is
             hidden while less than SEEN of its silhouette is seen, for GAP frames or more; told are the frames from
             the first one with more until its id stands on it again.
+pets        PETS 2009 S2.L1 from pixels: `trackcut` beside `compound` on the same regions, those of the background
+            detector with its first look over the file, found once and not told what a tracker believes; both are
+            given the pictures. The figures are those of `perdure score` against gt/gt.txt: boxes of the settled rows
+            that count. Frames/s are of the tracker's own calls, pictures decoded and regions found before.
+domain      what it costs to cut an object out of a window and not of the whole picture: cut_domain.py says what is
+            compared. On PETS and two composites with the background detector's regions, and on a sequence of DAVIS
+            with the first mask, in one frame of SAMPLED (n of each).
 speed       the share of each stage, on PETS 2009 S2.L1 at 768x576 with five objects (the five largest regions of a
             frame; when one of them is gone, five others), observations from the background detector; the rest of the
             step is what the stages leave. Beside it one bare pass of DIS on the same pictures (whole, the preset
             that the tracker has), in turn, frame by frame.
 
 The data is read from $PERDURE_DATA or ../shared/data beside the repository; what is not there is left out with a note.
---draw writes film strips as the paper's figures 4 to 7; --write puts the tables into docs/track-and-cut.md; --json
-prints everything as one object in the last line. Threads are as OpenCV has them by default.
+--draw writes film strips as the paper's figures 4 to 7; --write puts the tables into docs/track-and-cut.md, and leaves
+those of other parts there; --json prints everything as one object in the last line. Threads are as OpenCV has them by default.
 """
 
 from __future__ import annotations
@@ -33,13 +40,14 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import itertools
 import json
 import os
 import platform
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -48,6 +56,7 @@ from unittest import mock
 
 import cv2
 import numpy as np
+from cut_domain import Compared, compared, domain_table
 from regions import Table, chosen, markdown, plain
 
 from perdure import fold
@@ -55,17 +64,19 @@ from perdure.detect import Background
 from perdure.draw import Trails, paint
 from perdure.errors import ParameterError, PerdureError
 from perdure.features.masks import mask_overlaps
+from perdure.files.mot import read_truth
 from perdure.files.mots import read_masks
 from perdure.files.video import open_source
 from perdure.files.whole import whole_file
 from perdure.maths import flow
+from perdure.metrics import score
 from perdure.pipeline import FIRST_LOOKS, AnySource, plan
 from perdure.trackers import TRACKERS
 from perdure.trackers.trackcut import tracker as trackcut
 from perdure.types import Bits, Frame, Image, Mask, Regions, Rows, Scene, Tracks
 
 TRACKER = "trackcut"
-PARTS = ("davis", "composites", "speed")
+PARTS = ("davis", "composites", "pets", "domain", "speed")
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "track-and-cut.md"
 WARM = 5  # frames of a new start that are not timed
@@ -80,7 +91,7 @@ def main() -> None:
         if arguments.write:
             text = PAGE.read_text(encoding="utf-8")
             with whole_file(PAGE) as file:
-                file.write(replaced(text, section("python bench/trackcut_paper.py --write", result)))
+                file.write(replaced(text, section("python bench/trackcut_paper.py --write", result, text)))
         if arguments.json:
             print(json.dumps(result.told))
     except PerdureError as error:
@@ -120,6 +131,14 @@ def measure(arguments: argparse.Namespace) -> Result:
         watched = composites(arguments.data / "composites", arguments.draw)
         tables += composite_tables(watched) if watched else []
         told["composites"] = [one.as_json() for one in watched]
+    if "pets" in parts:
+        told_of = pets(arguments.data / "pets09-s2l1", arguments.draw)
+        tables += [pets_table(told_of)] if told_of else []
+        told["pets"] = [one.as_json() for one in told_of]
+    if "domain" in parts:
+        cut_twice = domain(arguments.data)
+        tables += [domain_table(cut_twice)] if cut_twice else []
+        told["domain"] = [one.as_json() for one in cut_twice]
     if "speed" in parts:
         speed = speed_of(arguments.data / "pets09-s2l1" / "video.avi")
         tables += [speed_table(speed)] if speed else []
@@ -189,9 +208,7 @@ def by_tracker(first: Frame, marked: Bits) -> Step:
     """Follow the mask by our tracker."""
     tracker = TRACKERS[TRACKER]()
     height, width = marked.shape
-    mask = Mask.of_image(marked)
-    regions = Regions.of([mask.box], masks=[mask], data={"mark": np.array([1])})
-    state, _ = tracker.step(tracker.start(Scene(width, height, DAVIS_FPS)), first, regions)
+    state, _ = tracker.step(tracker.start(Scene(width, height, DAVIS_FPS)), first, marked_regions(marked))
 
     def step(frame: Frame) -> Bits:
         nonlocal state
@@ -200,6 +217,12 @@ def by_tracker(first: Frame, marked: Bits) -> Step:
         return found[0].to_image(height, width) if found else np.zeros((height, width), np.bool_)
 
     return step
+
+
+def marked_regions(marked: Bits) -> Regions:
+    """Return what a user marks with a mask (H, W)."""
+    mask = Mask.of_image(marked)
+    return Regions.of([mask.box], masks=[mask], data={"mark": np.array([1])})
 
 
 def by_flow(first: Frame, marked: Bits) -> Step:
@@ -625,6 +648,120 @@ def composite_tables(watched: Sequence[Watched]) -> list[Table]:
     ]
 
 
+# People from pixels -----------------------------------------------------------------------------------------
+
+BESIDE = (TRACKER, "compound")
+FIGURES = ("MOTA", "IDF1", "HOTA", "IDSW", "ids", "FP", "FN")
+
+
+class Told(NamedTuple):
+    """What a tracker made of the regions of a film."""
+
+    tracker: str
+    frames: int
+    rate: float  # frames/s
+    figures: Mapping[str, float]
+
+    def as_json(self) -> dict[str, Any]:
+        figures = {name: self.figures[name] for name in FIGURES}
+        return {"tracker": self.tracker, "frames": self.frames, "frames/s": self.rate, **figures}
+
+
+def pets(folder: Path, drawings: Path | None, limit: int | None = None) -> list[Told]:
+    """Follow the people of a film by every tracker, on the same regions; of its first `limit` frames, if asked."""
+    if absent(folder / "video.avi"):
+        return []
+    truth = read_truth(folder / "gt" / "gt.txt")
+    source = open_source(str(folder / "video.avi"), end=None if limit is None else f"{limit}f")
+    try:
+        scene = source.scene(None)
+        detector = Background().prepare(source.sample(FIRST_LOOKS))
+        regions = [found for _, found in fold.detect(source, detector, scene)]
+        truth = truth.between(0, len(regions) - 1)
+        told, strips = [], []
+        for name in BESIDE:
+            said, seconds = told_by(TRACKERS[name](), zip(source, regions, strict=True), scene)
+            told.append(Told(name, len(regions), len(regions) / seconds, score(said, truth).figures))
+            print(f"{folder.name}, {name}: MOTA {told[-1].figures['MOTA']:.3f}", file=sys.stderr, flush=True)
+            strips.append(said)
+        if drawings:
+            wanted = set(np.linspace(0, len(regions) - 1, COLUMNS + 2).astype(int)[1:-1].tolist())
+            frames = [frame for frame in source if frame.index in wanted]
+            rows = [[(frame, said.in_frame(frame.index)) for frame in frames] for said in strips]
+            save_strip(drawings / f"{folder.name}.png", rows)
+    finally:
+        source.close()
+    return told
+
+
+def told_by(
+    tracker: fold.Tracker[Any], seen: Iterable[tuple[Frame, Regions]], scene: Scene
+) -> tuple[Tracks, float]:
+    """Return the settled rows, and the seconds that the tracker itself took."""
+    watch = Stopwatch()
+    watch.runs = True
+    start, step, finish = (watch.wrapped("own", one) for one in (tracker.start, tracker.step, tracker.finish))
+    state, reports = start(scene), []
+    for frame, regions in seen:
+        state, report = step(state, frame, regions)
+        reports.append(report)
+    reports.append(finish(state))
+    return fold.settle(reports), watch.spent["own"]
+
+
+def pets_table(told: Sequence[Told]) -> Table:
+    """A row per tracker."""
+    rows = []
+    for one in told:
+        shares = [f"{100 * one.figures[name]:.1f}" for name in FIGURES[:3]]
+        counts = [f"{one.figures[name]:.0f}" for name in FIGURES[3:]]
+        rows.append([one.tracker, *shares, *counts, f"{one.rate:.1f}"])
+    title = (
+        f"pets: people of {told[0].frames} frames from pixels, on the same regions; MOTA, IDF1 and HOTA in percent"
+    )
+    return Table(title, ["tracker", *FIGURES[:3], "switches", *FIGURES[4:], "frames/s"], rows)
+
+
+# The domain of a cut ----------------------------------------------------------------------------------------
+
+SAMPLED = {  # clip -> n: one frame of n
+    "pets09-s2l1/video.avi": 40,
+    "composites/crossing2/video.mp4": 10,
+    "composites/group4/video.mp4": 10,
+    "davis2016/JPEGImages/breakdance": 4,
+}
+
+
+def domain(data: Path) -> list[Compared]:
+    """Compare cuts in windows and over the whole picture, on every clip that is there."""
+    found = []
+    for clip, every in SAMPLED.items():
+        if absent(data / clip):
+            continue
+        scene, seen = marked_first(data / clip) if "davis" in clip else observed(data / clip)
+        found.append(compared(clip.split("/")[-1 if "davis" in clip else -2], seen, scene, every))
+        print(f"{found[-1].clip}: {len(found[-1].cuts)} cuts", file=sys.stderr, flush=True)
+    return found
+
+
+Seen = tuple[Scene, Iterator[tuple[Frame, Regions]]]
+
+
+def observed(path: Path) -> Seen:
+    """Return every frame of a video with the background detector's regions."""
+    source = open_source(str(path))
+    scene = source.scene(None)
+    return scene, fold.detect(source, Background().prepare(source.sample(FIRST_LOOKS)), scene)
+
+
+def marked_first(path: Path) -> Seen:
+    """Return every frame of a sequence of DAVIS, the first with its mask."""
+    film = davis_film(path.parents[1], path.name)
+    height, width = film.truth[0].shape
+    regions = [marked_regions(film.truth[0]), *[Regions.empty()] * (len(film.frames) - 1)]
+    return Scene(width, height, DAVIS_FPS), zip(film.frames, regions, strict=True)
+
+
 # Speed ------------------------------------------------------------------------------------------------------
 
 OBJECTS = 5
@@ -779,10 +916,25 @@ def _small(frame: Frame, said: Tracks) -> Image:
 # The page ---------------------------------------------------------------------------------------------------
 
 
-def section(command: str, result: Result) -> str:
-    """Return what stands between the marks in docs/track-and-cut.md."""
+def section(command: str, result: Result, page: str = "") -> str:
+    """Return what stands between the marks in docs/track-and-cut.md; a page's tables of parts that were not run stay."""
+    written = tables_on(page)
+    for part in PARTS:
+        if part in result.told:
+            written[part] = [markdown(one) for one in result.tables if one.title.startswith(f"{part}:")]
     told = ", ".join(f"{name} {version}" for name, version in result.told["versions"].items())
-    return "\n\n".join([f"`{command}`", *(markdown(one) for one in result.tables), f"Versions: {told}."])
+    tables = [table for part in PARTS for table in written.get(part, ())]
+    return "\n\n".join([f"`{command}`", *tables, f"Versions: {told}."])
+
+
+def tables_on(page: str) -> dict[str, list[str]]:
+    """Return the tables that a page has between our marks, by part."""
+    found: dict[str, list[str]] = {}
+    blocks = page.partition(BEGIN)[2].partition(END)[0].strip().split("\n\n")
+    for title, table in itertools.pairwise(blocks):
+        if title.startswith("**"):
+            found.setdefault(title[2:].partition(":")[0], []).append(f"{title}\n\n{table}")
+    return found
 
 
 def replaced(page: str, inside: str) -> str:

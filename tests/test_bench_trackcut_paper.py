@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cut_domain
 import cv2
 import numpy as np
 import pytest
 import trackcut_paper as bench
 import worlds
+from regions import Table
 
 from perdure.errors import ParameterError
+from perdure.files.film import Film
+from perdure.trackers.trackcut import expecting
 from perdure.trackers.trackcut import tracker as trackcut
+from perdure.trackers.trackcut.windows import Window
 from perdure.types import Frame, Mask, Regions, Rows, Scene, Tracks
 
 HEIGHT, WIDTH = 72, 96
@@ -211,6 +216,109 @@ def test_a_film_is_watched_in_every_setting(setting: str):
     assert set(told.ids.tolist()) <= {1}  # whether anything is founded between gaps is the tracker's matter
 
 
+# people from pixels
+
+
+def folder_of(world: worlds.World, folder: Path, past: int = 0) -> Path:
+    """A world as a film and a truth, which goes on for some frames after the film's end."""
+    (folder / "gt").mkdir(parents=True)
+    with Film(folder / "video.mp4", world.width, world.height, fps=world.fps) as film:
+        for frame in world.frames():
+            film.write(frame.image, frame.time)
+    (folder / "video.mp4").rename(folder / "video.avi")
+    rows = [(*row, 1) for row in zip(world.truth().frames, world.truth().ids, world.truth().boxes, strict=True)]
+    rows += [(world.count + k, 9, np.array([0, 0, 9, 9]), 1) for k in range(past)]
+    lines = [f"{k + 1},{name},{x1 + 1},{y1 + 1},{x2 - x1},{y2 - y1},1" for k, name, (x1, y1, x2, y2), _ in rows]
+    (folder / "gt" / "gt.txt").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def test_both_trackers_are_scored_on_the_same_regions_and_drawn(tmp_path: Path):
+    place = folder_of(worlds.lone_walker(count=30), tmp_path / "street", past=5)
+    told = bench.pets(place, tmp_path / "strips")
+    assert [one.tracker for one in told] == list(bench.BESIDE)
+    for one in told:
+        assert (one.frames, one.figures["ids"], one.figures["IDSW"]) == (30, 1, 0)
+        assert one.figures["FN"] <= 3  # nothing is asked for after the film's end
+        assert one.figures["MOTA"] > 0.85
+        assert one.rate > 0
+    table = bench.pets_table(told)
+    assert [row[0] for row in table.rows] == list(bench.BESIDE)
+    assert all(len(row) == len(table.head) for row in table.rows)
+    assert told[0].as_json()["FP"] == told[0].figures["FP"]
+    strip = cv2.imread(str(tmp_path / "strips" / "street.png"))
+    assert strip.shape[1] == bench.COLUMNS * bench.STRIP_WIDTH
+
+
+def test_a_film_may_be_followed_for_its_first_frames_only(tmp_path: Path):
+    told = bench.pets(folder_of(worlds.lone_walker(count=30), tmp_path / "street"), None, limit=12)
+    assert {one.frames for one in told} == {12}
+    assert all(one.figures["truth_rows"] == 9 for one in told)
+
+
+# the domain of a cut
+
+
+def marked_block(count: int = 6) -> tuple[Scene, list[tuple[Frame, Regions]]]:
+    """The block of `drawn`, marked in the first frame."""
+    film = drawn(count)
+    regions = [bench.marked_regions(film.truth[0]), *[Regions.empty()] * (count - 1)]
+    return Scene(WIDTH, HEIGHT, 24.0), list(zip(film.frames, regions, strict=True))
+
+
+def test_every_object_of_a_sampled_frame_is_cut_out_twice():
+    scene, seen = marked_block()
+    before = trackcut.expect, trackcut.contrast, trackcut.TrackCut._cut, expecting.around
+    found = bench.compared("block", seen, scene, every=2)
+    assert [(one.frame, one.object) for one in found.cuts] == [(2, 1), (4, 1)]
+    assert all(550 < one.area < 650 for one in found.cuts)
+    assert all(0 <= one.within < 0.1 and 0 <= one.anew < 0.1 for one in found.cuts)
+    assert all(seconds > 0 for one in found.cuts for seconds in one.seconds)
+    assert (trackcut.expect, trackcut.contrast, trackcut.TrackCut._cut, expecting.around) == before
+    table = bench.domain_table([found])
+    assert table.rows[0][:2] == ["block", "2"]
+    assert all(len(row) == len(table.head) for row in table.rows)
+    assert bench.domain_table([bench.Compared("nothing", ())]).rows == []
+
+
+def test_what_is_told_of_a_film_is_the_same_whether_or_not_it_is_compared():
+    scene, seen = marked_block()
+    sizes = []
+    for every in (1, 100):
+        cuts = bench.compared("block", seen, scene, every).cuts
+        sizes.append({one.frame: one.area for one in cuts})
+    assert set(sizes[0]) == {1, 2, 3, 4, 5}
+    assert sizes[1] == {}  # frame 0 has no object yet
+
+
+@pytest.mark.parametrize("step", [1, 2, 4])
+def test_the_whole_picture_has_the_cells_of_the_window(step: int):
+    part = Window(13, 7, 13 + 8 * step, 7 + 6 * step, step)
+    whole = cut_domain.over_all(part, Scene(WIDTH, HEIGHT))
+    assert whole.x1 <= 0
+    assert whole.y1 <= 0
+    assert whole.x2 >= WIDTH
+    assert whole.y2 >= HEIGHT
+    assert (part.x1 - whole.x1) % step == (part.y1 - whole.y1) % step == 0
+    inside = np.arange(48.0).reshape(part.shape)
+    both = cut_domain.placed(inside, np.full(whole.shape, -1.0), part, whole)
+    assert (both >= 0).sum() == inside.size
+    picture = np.zeros((HEIGHT, WIDTH), np.uint8)
+    picture[7 : 7 + 6 * step, 13 : 13 + 8 * step] = 200
+    np.testing.assert_array_equal(whole.cut(picture) == 200, both >= 0)
+
+
+def test_contrast_may_be_measured_elsewhere():
+    colours = np.random.default_rng(3).uniform(0, 60, (9, 12, 3)).astype(np.float32)
+    costs, sigma = trackcut.contrast(colours, 5.0)
+    with cut_domain.contrast_measured(sigma):
+        same, told = trackcut.contrast(colours, 5.0)
+    np.testing.assert_allclose(same, costs, rtol=1e-4)
+    assert told == sigma
+    with cut_domain.contrast_measured(4 * sigma):
+        assert (trackcut.contrast(colours, 5.0)[0] >= costs - 1e-4).all()
+
+
 # speed
 
 
@@ -255,9 +363,26 @@ def test_what_is_between_the_marks_is_replaced():
 def test_what_is_not_there_is_left_out_with_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert bench.davis(tmp_path, None) == []
     assert bench.composites(tmp_path, None) == []
+    assert bench.pets(tmp_path, None) == []
+    assert bench.domain(tmp_path) == []
     assert bench.speed_of(tmp_path / "video.avi") is None
     notes = capsys.readouterr().err
-    assert notes.count("is left out") == len(bench.PUBLISHED) + len(bench.CLIPS) + 1
+    assert notes.count("is left out") == len(bench.PUBLISHED) + len(bench.CLIPS) + 1 + len(bench.SAMPLED) + 1
+
+
+def test_tables_of_parts_that_were_not_run_stay():
+    def result(**parts: str) -> bench.Result:
+        tables = tuple(Table(f"{part}: {cell}", ["one"], [[cell]]) for part, cell in parts.items())
+        return bench.Result(tables, {"versions": {"python": "3"}, **parts})
+
+    both = f"{bench.BEGIN}\n{bench.section('run', result(davis='old', speed='old'))}\n{bench.END}\n"
+    page = bench.replaced(both, bench.section("run", result(speed="new", pets="new"), both))
+    assert [title for part in bench.tables_on(page).values() for title in part] == [
+        "**davis: old**\n\n| one |\n| --- |\n| old |",
+        "**pets: new**\n\n| one |\n| --- |\n| new |",
+        "**speed: new**\n\n| one |\n| --- |\n| new |",
+    ]
+    assert page.count("`run`") == page.count("Versions:") == 1
 
 
 def test_an_unknown_part_is_refused_in_one_line(
@@ -269,4 +394,4 @@ def test_an_unknown_part_is_refused_in_one_line(
     said_of_it = capsys.readouterr().err
     assert left.value.code == 2
     assert said_of_it.count("\n") == 1
-    assert "davis, composites, speed" in said_of_it
+    assert ", ".join(bench.PARTS) in said_of_it
