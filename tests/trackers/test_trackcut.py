@@ -235,6 +235,35 @@ def test_a_mark_says_the_id_and_marking_again_corrects_the_mask():
     assert overlap(tracks, 11, 9, thing.bits(11)) > 0.8
 
 
+def beside(things: tuple[Thing, ...], k: int, frame: int, identity: int = 3) -> Regions:
+    """What a detector sees; in one frame the last thing is marked, and goes before the others."""
+    if k != frame:
+        return seen(things, k)
+    masks = [Mask.of_image(thing.bits(k)) for thing in things[::-1]]
+    marks = np.array([identity, *[0] * (len(masks) - 1)])
+    return Regions.of([mask.box for mask in masks], masks=masks, data={"mark": marks})
+
+
+def test_what_is_marked_beside_a_detector_is_followed_and_the_others_are_found():
+    red, blue = walker(y=30), walker(y=90, colour=(60, 70, 190))
+    tracks, _ = followed(film(red, blue, count=14), lambda k: beside((red, blue), k, 0), reserved=3)
+    assert overlap(tracks, 13, 3, blue.bits(13)) > 0.8
+    assert overlap(tracks, 13, 4, red.bits(13)) > 0.8
+    assert np.unique(tracks.ids).tolist() == [3, 4]
+
+
+def test_who_is_marked_late_gets_the_marks_id_and_nobody_has_had_it():
+    red, blue = walker(y=30), walker(y=90, colour=(60, 70, 190))
+    tracks, reports = followed(film(red, blue, count=16), lambda k: beside((red, blue), k, 8), reserved=3)
+    assert 3 not in tracks.ids[tracks.frames < 8]
+    assert [len(tracks.in_frame(k)) for k in (7, 8, 15)] == [2, 2, 2]
+    assert overlap(tracks, 15, 3, blue.bits(15)) > 0.8
+    red_one = next(int(one) for one in tracks.in_frame(7).ids if overlap(tracks, 7, int(one), red.bits(7)) > 0.8)
+    assert overlap(tracks, 15, red_one, red.bits(15)) > 0.8
+    told = [(event.kind, event.ids) for report in reports for event in report.events]
+    assert told.count(("entered", (3,))) == 1
+
+
 # ---- parts ------------------------------------------------------------------------------------------------------
 
 

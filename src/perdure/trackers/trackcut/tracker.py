@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.masks import mask_shares
+from perdure.features.masks import mask_overlaps, mask_shares
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
 from perdure.trackers.trackcut.cutting import Observed, contrast, cut_out, touching
@@ -35,6 +35,7 @@ _ALONE, _UNSURE = (
     0.4,
     2.0,
 )  # s for which an object is too small, seen by itself or without observation, until it has changed
+_MARKED = 0.5  # IoU from which an object is what is marked there
 _RATE = 0.1  # share of a new size
 _ALIKE = 0.5  # nats a pixel by which what is found must look more like the object than like its surroundings
 _SIMILAR = (0.4, 2.5)  # ratio of sizes of one that is found again
@@ -88,6 +89,7 @@ class TrackCut:
         0.0004, "area of the smallest object that an observation founds", unit="of the picture", low=0.0, high=1.0
     )
     second: bool = parameter(True, "whether objects that overlap are separated by the second energy")
+    reserved: int = field(default=0, repr=False)  # ids up to it are those of marks, also of later ones
 
     needs_pixels = True
     follows_marks = True
@@ -95,7 +97,9 @@ class TrackCut:
     def start(self, scene: Scene) -> TrackCutState:
         """Return the state without an object."""
         none = np.zeros((0, 0), np.uint8)
-        return TrackCutState((), (), np.zeros((0, 0, 3), np.uint8), none, 1, 1, 0.0, (scene.height, scene.width))
+        return TrackCutState(
+            (), (), np.zeros((0, 0, 3), np.uint8), none, 1, self.reserved + 1, 0.0, (scene.height, scene.width)
+        )
 
     def step(self, state: TrackCutState, frame: Frame, regions: Regions) -> tuple[TrackCutState, Report]:
         """Predict and cut out every object, separate those that overlap, learn, find new ones, say."""
@@ -308,19 +312,21 @@ class TrackCut:
         events: list[Event] = []
         next_id = max([state.next_id, *(one.id + 1 for one in targets)])
         for number, mask in enumerate(observations):
-            if marks is None:
-                covered = mask_shares([mask], [one.mask for one in targets]).sum()
+            identity = int(marks[number]) if marks is not None else 0
+            if not identity:
+                held = [one.mask for one in (*targets, *(one for one in born if one.marked))]
+                covered = mask_shares([mask], held).sum()
                 if number in taken or covered >= _NEW_COVERED or mask.area < least:
                     continue
                 if len(state.colours) and not (mask_shares([mask], state.waiting) > _SAME).any():
                     waiting.append(mask)
                     continue
-            identity = int(marks[number]) if marks is not None else 0
             lost = self._found_again(targets, mask, sight, identity)
             if lost is not None:
-                targets[lost] = self._newborn(
-                    mask, sight, regions, number, frame, targets[lost].key, targets[lost].id
-                )
+                was = targets[lost]
+                targets[lost] = self._newborn(mask, sight, regions, number, frame, was.key, identity or was.id)
+                if identity and identity != was.id:
+                    events.append(Event("entered", frame.index, frame.index, (identity,)))
                 continue
             identity = identity or next_id
             next_id = max(next_id, identity + 1)
@@ -331,13 +337,12 @@ class TrackCut:
         return [*targets, *born], born, tuple(waiting), events
 
     def _found_again(self, targets: list[Target], mask: Mask, sight: Sight, identity: int) -> int | None:
-        """Return which lost object an observation is, if any: the one of that id, or the one that looks most like it."""
+        """Return which object an observation is, if any: the one of that id, the one marked now, a lost one like it."""
+        if identity:
+            same = [number for number, one in enumerate(targets) if one.id == identity]
+            return same[0] if same else _found_there(targets, mask)
         best, least = None, _ALIKE
         for number, one in enumerate(targets):
-            if identity:
-                if one.id == identity:
-                    return number
-                continue
             if one.missed <= 0 or not _SIMILAR[0] <= mask.area / max(one.mean, 1.0) <= _SIMILAR[1]:
                 continue
             points = _colours_of(sight, mask)
@@ -378,7 +383,7 @@ class TrackCut:
             float(regions.scores[row]),
             str(regions.classes[row]),
             (row,),
-            "mark" in regions.data,
+            bool(regions.data["mark"][row]) if "mark" in regions.data else False,
         )
 
 
@@ -389,6 +394,13 @@ def _mask_of(regions: Regions, row: int) -> Mask:
         return mask
     x1, y1, x2, y2 = (round(float(one)) for one in regions.boxes[row])
     return Mask(max(y1, 0), max(x1, 0), np.ones((max(y2 - max(y1, 0), 0), max(x2 - max(x1, 0), 0)), np.bool_))
+
+
+def _found_there(targets: list[Target], mask: Mask) -> int | None:
+    """Which object of no mark is where a mark is now, if any: half of both is common."""
+    common = mask_overlaps([mask], [one.mask for one in targets])[0] if targets else np.zeros(0)  # (N,)
+    free = [number for number, one in enumerate(targets) if not one.marked and common[number] >= _MARKED]
+    return max(free, key=common.__getitem__, default=None)
 
 
 def _things(targets: list[Target], sight: Sight) -> NDArray[np.bool_]:
