@@ -16,7 +16,7 @@ from worlds import two_apart
 
 import perdure
 from perdure.cli.main import run as run_command
-from perdure.detect import Marked
+from perdure.detect import Background, Marked
 from perdure.errors import ParameterError
 from perdure.files.log import read_log
 from perdure.trackers import TRACKERS
@@ -45,6 +45,7 @@ class Held:
 class Hold:
     """A tracker that says the last marks again and again."""
 
+    reserved: int = 0
     needs_pixels = False
     follows_marks = True
 
@@ -113,6 +114,46 @@ def test_a_tracker_that_follows_marks_is_the_one_that_gets_them(track, monkeypat
     assert json.loads(Path("run/run.json").read_text())["tracker"]["name"] == "compound"
 
 
+def detections(*rows: tuple[int, int, int]) -> None:
+    """Write det.txt: boxes of 10x16 pixels at (frame, x, y)."""
+    text = "".join(f"{frame + 1},-1,{x + 1},{y + 1},10,16,1,-1,-1,-1\n" for frame, x, y in rows)
+    Path("det.txt").write_text(text)
+
+
+def test_beside_a_detector_marks_come_first_and_its_own_view_of_them_is_left_out(track):
+    detections((9, 19, 10), (10, 21, 10), (10, 88, 50), (10, 60, 20))  # 10: the red one, the blue one, a stranger
+    done = track("--init", "blue.png@10", "--detector", "det.txt", *NOTHING_MORE)
+    assert done.code == 0, done.stderr
+    assert rows_at(9).boxes.tolist() == [[19, 10, 29, 26]]
+    there = [[21, 10, 31, 26], [60, 20, 70, 36], [*Mask.of_image(BLUE).box]]
+    assert sorted(rows_at(10).boxes.tolist()) == there
+    about = json.loads(Path("run/run.json").read_text())
+    assert (about["detector"]["name"], about["init"]) == ("recorded", ["blue.png@10"])
+
+
+def test_beside_a_detector_what_is_marked_has_its_id_and_what_is_found_another(track):
+    done = track("--init", "both.png@10", "--detector", "background", "--no-video")
+    assert done.code == 0, done.stderr
+    assert json.loads(Path("run/run.json").read_text())["tracker"]["name"] == "trackcut"
+    for frame in (9, 39):
+        rows = rows_at(frame)
+        red, blue = (next(k for k, box in enumerate(rows.boxes) if near(box, frame, n)) for n in range(2))
+        assert [rows.ids[red], rows.ids[blue]] == ([5, 6] if frame == 9 else [1, 4])
+
+
+def near(box: np.ndarray, frame: int, block: int) -> bool:
+    """Whether a box is where a block of the film is."""
+    x, y = ((5 + 2 * (frame - 2), 10), (100 - 2 * (frame - 4), 50))[block]
+    return bool(np.abs(box - (x, y, x + 10, y + 16)).max() <= 3)
+
+
+def test_marks_beside_a_detector_of_classes_are_of_every_class(track):
+    detections((10, 60, 20))
+    done = track("--init", "blue.png@10", "--detector", "det.txt", "--class", "dog", *NOTHING_MORE)
+    assert done.code == 0, done.stderr
+    assert len(rows_at(10)) == 1
+
+
 def test_frames_of_marks_are_the_sources_own_after_a_start(track):
     done = track("--init", "both.png@10", "--start", "8f", "--stride", "2", *NOTHING_MORE)
     assert done.code == 0, done.stderr
@@ -129,7 +170,9 @@ def test_frames_of_marks_are_the_sources_own_after_a_start(track):
         (["--init", "both.png@10", "--end", "10f"], "0 to 9"),
         (["--init", "both.png@10", "--init", "both.png@10"], "marked twice"),
         (["--init", "0,0,120,80"], "covers 100.0 %"),
-        (["--init", "both.png", "--detector", "background"], "do not go together"),
+        (["--init", "both.png@10", "--detector", "gone.txt"], "no such file of detections"),
+        (["--init", "both.png@40", "--detector", "background"], "frame 40 is not among those that are tracked"),
+        (["--init", "both.png@10", "--detector", "background", "--class", "dog"], "names no classes"),
         (["--init", "both.png", "--class", "dog"], "--class"),
         (["--init", "both.png", "--least-area", "0.1"], "'background'"),
         (["--init", "both.png@10", "--roi", "50,0,20,80"], "outside the roi"),
@@ -166,6 +209,9 @@ def test_from_python_masks_may_be_arrays_with_their_frame(monkeypatch):
     assert plan.init == ("an array of 120x80@10",)
     assert isinstance(plan.detector, Marked)
     assert perdure.plan(FILM, init=[]).detector_name == "background"
+    plan = perdure.plan(FILM, init=(indices, 10), detector="background")
+    assert isinstance(plan.detector, Background)
+    assert [mark.id for mark in plan.marks] == [2, 3]
 
 
 def test_of_what_passes_once_only_frame_0_can_be_marked(monkeypatch):

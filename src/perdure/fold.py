@@ -45,7 +45,7 @@ class Tracker(Protocol[S]):
     `step` changes neither `frame` nor `regions` and depends on nothing else. The state passed in is
     consumed: its buffers may be reused; `perdure.states.save` gives an independent copy.
     A tracker that goes on from what the user marked (`regions.data["mark"]`), with no detector after that frame, has
-    `follows_marks = True`.
+    `follows_marks = True`, and a field `reserved`: ids up to it are the marks', and what it finds itself gets others.
     """
 
     needs_pixels: bool

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure import fold, params
-from perdure.detect import DETECTORS, Marked, Recorded
+from perdure.detect import DETECTORS, Mark, Marked, Recorded, WithMarks
 from perdure.errors import DamagedVideo, FormatError, ParameterError
 from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.regions import read_regions
@@ -42,6 +42,7 @@ class Plan:
     tracker: Any
     classes: tuple[str, ...]
     init: tuple[str, ...] = ()  # what the user marked, in words
+    marks: tuple[Mark, ...] = ()  # what he marked beside the detector's regions
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -50,7 +51,7 @@ class Plan:
                 raise ParameterError(
                     f"{self.source.name} has no images and this {what} needs them; name a --detector FILE"
                 )
-        if self.classes and self.init:
+        if self.classes and self.detector_name == "marked":
             raise ParameterError("what is marked has no class; leave out --class")
         if self.classes and self.detector_name == "background":
             raise ParameterError(
@@ -66,10 +67,16 @@ class Plan:
 
     def notes(self) -> tuple[str, ...]:
         """Return what the user should know about how source, detections and tracker went together."""
-        if self.init and not follows_marks(self.tracker):
-            return (
-                f"the tracker {self.tracker_name} does not follow marks: it knows of each in its own frame only",
-            )
+        return (*self._of_marks(), *self._of_detections())
+
+    def _of_marks(self) -> tuple[str, ...]:
+        """What the user should know about his marks."""
+        if not self.init or follows_marks(self.tracker):
+            return ()
+        return (f"the tracker {self.tracker_name} does not follow marks: it knows of each in its own frame only",)
+
+    def _of_detections(self) -> tuple[str, ...]:
+        """What the user should know about his file of detections."""
         if not isinstance(self.detector, Recorded) or not self.source.count:
             return ()
         frames, count = self.detector.regions.keys(), self.source.count
@@ -89,17 +96,24 @@ class Plan:
 
     def seen(self, frames: Iterable[Frame] | None = None) -> Iterator[tuple[Frame, Regions]]:
         """Yield every frame with its regions, of the wanted classes only."""
-        for frame, regions in fold.detect(self.source if frames is None else frames, self.detector, self.scene):
+        for frame, regions in fold.detect(self.source if frames is None else frames, self._whole(), self.scene):
             yield frame, self._wanted(regions)
 
     def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
         """Yield every step of the run, the finishing one last."""
         given = self.source if frames is None else frames
-        return fold.run(given, self.detector, self.tracker, self.scene, self._wanted)
+        return fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
+
+    def _whole(self) -> Any:
+        """The detector, with the marks beside it."""
+        return WithMarks(self.detector, self.marks) if self.marks else self.detector
 
     def _wanted(self, regions: Regions) -> Regions:
-        """The regions of the wanted classes."""
-        return regions.take(np.isin(regions.classes, self.classes)) if self.classes else regions
+        """The regions of the wanted classes, and what is marked."""
+        if not self.classes:
+            return regions
+        marks = regions.data.get("mark", np.zeros(len(regions), np.int64))
+        return regions.take(np.isin(regions.classes, self.classes) | (marks > 0))
 
 
 def plan(
@@ -128,8 +142,9 @@ def plan(
         'background', or a file of regions (`.jsonl` of `perdure detect`, or MOTChallenge `.txt`);
         None for the background, or for `det/det.txt` of a MOTChallenge folder without images.
     init : str, Path, (H, W) array of whole numbers, pair of one of these and its frame, or list of these
-        What the user marked, instead of a detector: an index PNG or array (the value is the id, 0 nothing), a box
-        'x,y,w,h' or a polygon 'x,y x,y x,y …', with '@FRAME' behind a text for another frame than 0.
+        What the user marked, an index PNG or array (the value is the id, 0 nothing), a box 'x,y,w,h' or a polygon
+        'x,y x,y x,y …', with '@FRAME' behind a text for another frame than 0. Where no detector is named there is
+        none: only what is marked is followed.
     fps : float or None
         Frames per second, where the source has none or a wrong one.
     start, end : str, float or None
@@ -149,15 +164,10 @@ def plan(
         The caller's mistake, in one line.
     """
     words = () if init is None else words_of(init)
-    if words and detector is not None:
-        raise ParameterError(
-            f"--init and --detector {detector} do not go together yet: what is marked is followed without a "
-            "detector; leave one of them out"
-        )
     tracker = _default_tracker(marked=bool(words)) if tracker is None else tracker
     if not isinstance(tracker, str) or tracker not in TRACKERS:
         raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
-    name = "marked" if words else detector_name(detector)
+    name = "marked" if words and detector is None else detector_name(detector)
     opened = open_source(source, fps=fps, start=start, end=end, stride=stride)
     try:
         if detector is None and not words and not opened.has_images:
@@ -168,11 +178,16 @@ def plan(
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
+        marks: tuple[Mark, ...] = ()
         if init is not None and words:
             _refuse_late_start(opened, start)
-            made_detector = Marked(marks=read_marks(init, scene, opened.wanted))
+            marks = read_marks(init, scene, opened.wanted)
+        if name == "marked":
+            made_detector, marks = Marked(marks=marks), ()
+        if marks and follows_marks(made_tracker):
+            made_tracker = dataclasses.replace(made_tracker, reserved=max(mark.id for mark in marks))
         wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
-        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words)
+        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words, marks)
         made.check()
     except BaseException:
         opened.close()

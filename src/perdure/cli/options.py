@@ -87,8 +87,9 @@ InitOption = Annotated[
     typer.Option(
         "--init",
         metavar="WHAT[@FRAME]",
-        help="Follow what is marked in a frame (from 0; default 0), with no detector: an index PNG (pixel value = "
-        "id, 0 = nothing), a box x,y,w,h, or a polygon 'x,y x,y …'; may be repeated.",
+        help="Follow what is marked in a frame (from 0; default 0): an index PNG (pixel value = id, 0 = nothing), "
+        "a box x,y,w,h, or a polygon 'x,y x,y …'; may be repeated. With no detector, unless --detector names one: "
+        "then what that sees is observed, and new things are found, too.",
         show_default=False,
     ),
 ]

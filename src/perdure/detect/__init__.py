@@ -7,7 +7,8 @@ from typing import Any
 from perdure.detect.background import Background
 from perdure.detect.marked import Mark, Marked
 from perdure.detect.recorded import Recorded
+from perdure.detect.with_marks import WithMarks
 
-__all__ = ["DETECTORS", "Background", "Mark", "Marked", "Recorded"]
+__all__ = ["DETECTORS", "Background", "Mark", "Marked", "Recorded", "WithMarks"]
 
 DETECTORS: dict[str, type[Any]] = {"background": Background, "recorded": Recorded, "marked": Marked}
