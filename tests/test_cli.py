@@ -53,6 +53,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_the_package_may_be_run_as_the_command(place: Path):
+    words = [sys.executable, "-m", "perdure", "--version"]
+    done = subprocess.run(words, cwd=place, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout[:8]) == (0, "perdure ")
+
+
 def test_a_run_folder_holds_run_log_tracks_events_and_a_film(place: Path):
     assert {path.name for path in (place / "first").iterdir()} == {
         "run.json", "tracks.jsonl", "tracks.txt", "events.csv", "tracked.mp4",
