@@ -11,11 +11,13 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import pytest
+from worlds import two_apart
 
 from perdure.cli.main import run as run_command
 from perdure.files import mask_pngs, mots
-from perdure.files.log import RunLog
+from perdure.files.log import RunLog, read_log
 from perdure.files.runs import RunFolder
+from perdure.fold import settle
 from perdure.types import Mask, Renamed, Report, Rows, Status, Tracks
 
 HEIGHT, WIDTH = 30, 40
@@ -150,3 +152,42 @@ def test_a_damaged_log_leaves_nothing_behind(export: Callable[..., Done], run: P
         refused = export("run", "--format", form, "-o", "out")
         assert (refused.code, "line" in refused.stderr) == (2, True)
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_silhouettes_that_track_and_cut_found_come_back_from_both_formats(
+    export: Callable[..., Done], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    frames = two_apart().frames()[10:20]
+    (tmp_path / "film").mkdir()
+    for frame in frames:
+        cv2.imwrite(f"film/{frame.index:03d}.png", frame.image[:, :, ::-1])
+    reds = (frames[0].image == (200, 40, 40)).all(axis=2)
+    blues = (frames[0].image == (40, 60, 220)).all(axis=2)
+    cv2.imwrite("both.png", np.uint8(reds * 3 + blues * 1))
+    monkeypatch.setattr(
+        sys, "argv", ["perdure", "track", "film", "-o", "run", "--init", "both.png", "--no-video", "--fps", "10"]
+    )
+    assert run_command() == 0
+    said = settle(entry.report for entry in read_log(Path("run/tracks.jsonl"))).counted()
+    assert sorted(set(said.ids.tolist())) == [1, 3]
+    assert len(said) == 20
+    assert export("run", "--format", "mots", "-o", "out.txt").code == 0
+    assert export("run", "--format", "mask-png", "-o", "out").code == 0
+    wanted = sorted(told(Rows.of(frames=said.frames, ids=said.ids, masks=said.masks)))
+    size = frames[0].image.shape[:2]
+    for rows in (mots.read_masks(Path("out.txt")), mask_pngs.read_masks(Path("out"), void=True)):
+        assert rows.size == size
+        assert sorted(told(rows)) == wanted
+        there = {
+            (int(frame), int(name)): mask
+            for frame, name, mask in zip(rows.frames, rows.ids, rows.masks, strict=True)
+        }
+        for frame, name, mask in zip(said.frames, said.ids, said.masks, strict=True):
+            assert np.array_equal(there[int(frame), int(name)].to_image(*size), mask.to_image(*size))
+    first = {
+        name: mask.to_image(*size)
+        for frame, name, mask in zip(said.frames, said.ids, said.masks, strict=True)
+        if frame == 0
+    }
+    assert np.array_equal(first[3], reds)
+    assert np.array_equal(first[1], blues)

@@ -88,6 +88,78 @@ def test_a_silhouette_is_tinted_inside_and_left_out_on_demand():
     assert not changed(paint(frame, rows, Trails.empty(), SCENE, masks=False), 128)[45:65, 65:75].any()
 
 
+def block(x: int, y: int, width: int, height: int) -> Mask:
+    return Mask(y, x, np.ones((height, width), bool))
+
+
+def blended(identity: int, grey: int) -> np.ndarray:
+    """What a pixel of a silhouette looks like: three quarters of the picture, one of the id's colour."""
+    return 0.74 * grey + 0.26 * np.array(colour_of(identity))
+
+
+def painted(rows: Tracks, grey: int = 128) -> np.ndarray:
+    return paint(Frame(0, 0.0, ground(grey)), rows, Trails.empty(), SCENE)
+
+
+@pytest.mark.parametrize("grey", [0, 128, 255])
+def test_pixels_of_a_silhouette_are_blended_with_the_colour_of_its_id(grey):
+    masks = [block(20, 40, 24, 40), block(100, 40, 24, 40)]
+    picture = painted(rows_of([[10, 30, 54, 90], [90, 30, 134, 90]], ids=[3, 8], masks=masks), grey)
+    for identity, mask in zip((3, 8), masks, strict=True):
+        x1, y1, x2, y2 = mask.box
+        inside = picture[y1 + 3 : y2 - 3, x1 + 3 : x2 - 3].reshape(-1, 3)
+        assert np.abs(inside - blended(identity, grey)).max() <= 1
+    assert (picture[45:85, 60:85] == grey).all()  # between the two
+    assert (picture[50:80, 46:50] == grey).all()  # in the box and not of the silhouette
+
+
+def test_an_outline_runs_round_a_silhouette_and_round_a_hole_in_it():
+    bits = np.ones((50, 50), bool)
+    bits[20:34, 18:32] = False
+    picture = painted(rows_of([[40, 20, 110, 100]], ids=[5], masks=[Mask(35, 50, bits)]))
+    colour = np.array(colour_of(5))
+    for y, x in ((60, 50), (60, 99), (35, 75), (84, 75)):  # its left, right, upper and lower edge
+        assert np.abs(picture[y, x] - colour).max() <= 12, (y, x)
+    assert np.abs(picture[62, 67] - colour).max() <= 20  # left of the hole
+    assert (picture[58:66, 71:79] == 128).all()  # the hole itself
+
+
+def test_a_row_without_a_silhouette_looks_as_if_no_other_had_one():
+    boxes = [[10, 30, 50, 90], [100, 30, 140, 90]]
+    both = painted(rows_of(boxes, masks=[Mask.empty(), block(105, 40, 20, 40)]))
+    bare = painted(rows_of(boxes))
+    assert np.array_equal(both[:, :80], bare[:, :80])
+    assert not np.array_equal(both[:, 80:], bare[:, 80:])
+
+
+@pytest.mark.parametrize("box", [(-12, 40, 30, 40), (140, 40, 40, 40), (60, -9, 30, 30), (60, 100, 30, 50)])
+def test_a_silhouette_that_leaves_the_picture_is_cut_at_its_edge(box):
+    x, y, width, height = box
+    picture = painted(rows_of([[x, y, x + width, y + height]], ids=[4], masks=[block(*box)]))
+    left, top, right, bottom = max(x, 0), max(y, 0), min(x + width, 160), min(y + height, 120)
+    middle = picture[(top + bottom) // 2, (left + right) // 2]
+    assert np.abs(middle - blended(4, 128)).max() <= 1
+    across = (slice(None), slice(0, 30)) if x > 100 else (slice(None), slice(120, 160))
+    marks = changed(picture, 128)
+    marks[100:, :60] = False  # the clock
+    assert not marks[across].any()  # nothing comes in again on the other side
+
+
+def test_a_silhouette_wholly_outside_changes_nothing():
+    boxes = [[10, 30, 50, 90]]
+    bare = painted(rows_of(boxes))
+    for place in ((-40, 10), (170, 10), (60, -50), (60, 130), (10**6, 0)):
+        assert np.array_equal(painted(rows_of(boxes, masks=[block(*place, 20, 30)])), bare)
+
+
+def test_who_is_hidden_has_a_dotted_outline_and_no_fill():
+    rows = rows_of([[40, 20, 120, 100]], status=[Status.OCCLUDED], believed=[block(55, 35, 50, 50)])
+    picture = painted(rows)
+    assert (picture[45:75, 65:95] == 128).all()
+    along = changed(picture, 128)[40:80, 55]
+    assert 0.2 < along.mean() < 0.9
+
+
 def test_a_hidden_half_that_is_believed_is_dotted():
     seen, whole = Mask(40, 60, np.ones((40, 20), bool)), Mask(40, 60, np.ones((40, 60), bool))
     columns = {"status": [Status.PARTLY_OCCLUDED], "masks": [seen]}
