@@ -220,6 +220,25 @@ def test_strange_marks_and_pictures_are_borne(cover: str):
     assert set(tracks.ids.tolist()) <= {4}
 
 
+@pytest.mark.parametrize("silhouettes", [True, False], ids=["silhouettes", "boxes"])
+@pytest.mark.parametrize("smallest", [0.0004, 0.0])
+def test_observations_that_leave_the_picture_are_cut_at_its_edge(silhouettes: bool, smallest: float):
+    thing = walker(x=150, step=4)  # goes out on the right in frame 10
+    wide = [(150, 30, 4000, 90), (-300, 20, -200, 60), (20, 20, 20, 20), (-1e6, -1e6, 1e6, 1e6)]
+
+    def observed(k: int) -> Regions:
+        if k < 5:
+            return seen((thing,), k)
+        if not silhouettes:
+            return Regions.of(wide)
+        masks = [Mask(30, 150, np.ones((60, 900), bool)), Mask(20, -300, np.ones((40, 100), bool))]
+        return Regions.of([mask.box for mask in masks], masks=masks)
+
+    tracks, _ = followed(film(thing, count=20), observed, smallest=smallest)
+    assert 1 in tracks.ids
+    assert all(mask.box[2] <= WIDTH and mask.box[0] >= 0 for mask in tracks.masks if mask.area)
+
+
 def test_a_mark_says_the_id_and_marking_again_corrects_the_mask():
     thing = walker()
     wrong = Thing(lambda k: (150, 60), (170, 60, 60))

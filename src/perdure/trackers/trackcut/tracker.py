@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.masks import mask_overlaps, mask_shares
+from perdure.features.masks import disjoint, mask_overlaps, mask_shares
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
 from perdure.trackers.trackcut.cutting import Observed, contrast, cut_out, touching
@@ -106,7 +106,7 @@ class TrackCut:
         if frame.image is None:
             return replace(state, time=frame.time), Report()
         sight = look_at(frame.image)
-        observations = [_mask_of(regions, row) for row in range(len(regions))]
+        observations = [_mask_of(regions, row, state.size) for row in range(len(regions))]
         targets = list(state.targets)
         events: list[Event] = []
         if state.grey.shape == sight.grey.shape and targets:
@@ -316,7 +316,7 @@ class TrackCut:
             if not identity:
                 held = [one.mask for one in (*targets, *(one for one in born if one.marked))]
                 covered = mask_shares([mask], held).sum()
-                if number in taken or covered >= _NEW_COVERED or mask.area < least:
+                if number in taken or covered >= _NEW_COVERED or mask.area < max(least, 1):
                     continue
                 if len(state.colours) and not (mask_shares([mask], state.waiting) > _SAME).any():
                     waiting.append(mask)
@@ -387,13 +387,13 @@ class TrackCut:
         )
 
 
-def _mask_of(regions: Regions, row: int) -> Mask:
-    """The silhouette of an observation; its box where there is none."""
-    mask = regions.masks[row]
-    if mask.area:
-        return mask
-    x1, y1, x2, y2 = (round(float(one)) for one in regions.boxes[row])
-    return Mask(max(y1, 0), max(x1, 0), np.ones((max(y2 - max(y1, 0), 0), max(x2 - max(x1, 0), 0)), np.bool_))
+def _mask_of(regions: Regions, row: int, size: tuple[int, int]) -> Mask:
+    """The silhouette of an observation inside a picture (height, width); its box where there is none."""
+    height, width = size
+    if regions.masks[row].area:
+        return disjoint([regions.masks[row]], height, width)[0]
+    x1, y1, x2, y2 = np.clip(np.rint(regions.boxes[row]), 0, (width, height, width, height)).astype(int).tolist()
+    return Mask(y1, x1, np.ones((y2 - y1, x2 - x1), np.bool_))
 
 
 def _found_there(targets: list[Target], mask: Mask) -> int | None:
