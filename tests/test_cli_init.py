@@ -165,6 +165,13 @@ def test_frames_of_marks_are_the_sources_own_after_a_start(track):
     [
         (["--init", "gone.png"], "init = 'gone.png': there is no such file"),
         (["--init", "small.png"], "the mask is 60x40, the video 120x80"),
+        (["--init", "empty.png"], "the mask is empty"),
+        (["--init", "full.png"], "covers 100.0 %"),
+        (["--init", "both.png@10", "--detector", "nan.txt"], "nan.txt, line 1"),
+        (["--init", "both.png@10", "--detector", "nan.jsonl"], "nan.jsonl, line 2: a box must be finite"),
+        (["--init", "both.png@10", "--detector", "score.jsonl"], "score.jsonl, line 2: scores must be numbers"),
+        (["--init", "nan,10,20,30"], "it is no file, no box and no polygon"),
+        (["--init", "both.png@10", "--trust", "nan"], "trust = nan is out of range"),
         (["--init", "both.png@40"], "frame 40 is not among those that are tracked, 0 to 39"),
         (["--init", "both.png@10", "--start", "20f"], "20 to 39"),
         (["--init", "both.png@10", "--end", "10f"], "0 to 9"),
@@ -182,11 +189,55 @@ def test_frames_of_marks_are_the_sources_own_after_a_start(track):
 )
 def test_a_mark_that_cannot_be_is_one_clear_line_exit_code_2_and_nothing_left_behind(track, words, said):
     cv2.imwrite("small.png", np.ones((40, 60), np.uint8))
+    cv2.imwrite("empty.png", np.zeros((80, 120), np.uint8))
+    cv2.imwrite("full.png", np.ones((80, 120), np.uint8))
+    Path("nan.txt").write_text("1,-1,10,nan,20,30,1,-1,-1,-1\n")
+    for name, x, score in (("nan", "NaN", 1), ("score", 10, "NaN")):
+        row = f'{{"frame":0,"time":0,"boxes":[[{x},9,20,30]],"scores":[{score}],"classes":[""],"masks":[null]}}'
+        Path(f"{name}.jsonl").write_text(f'{{"format":"perdure-regions","version":1}}\n{row}\n')
     done = track(*words)
     assert done.code == 2
     assert said in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not Path("run").exists()
+
+
+@pytest.mark.parametrize("words", [["--init", "box.png"], ["--init", "10,10,30,30"], ["--tracker", "trackcut"]])
+@pytest.mark.parametrize("grey", [0, 128, 255])
+def test_a_film_of_one_colour_ends_well(track, words, grey):
+    for path in Path("film").iterdir():
+        cv2.imwrite(str(path), np.full((80, 120, 3), grey, np.uint8))
+    box = np.zeros((80, 120), np.uint8)
+    box[10:40, 10:40] = 7
+    cv2.imwrite("box.png", box)
+    done = track(*words, "--end", "12f", "--no-video")
+    assert done.code == 0, done.stderr
+    marked = rows_at(0)
+    assert [mask.area for mask in marked.masks] == ([900] if "--init" in words else [])
+    assert {one for k in range(12) for one in rows_at(k).ids.tolist()} <= {1, 7}
+
+
+def test_frames_of_one_colour_in_between_are_got_over(track):
+    for k in (15, 16, 17):
+        cv2.imwrite(f"film/{k:03d}.png", np.full((80, 120, 3), 128, np.uint8))
+    done = track("--init", "both.png@10", "--no-video")
+    assert done.code == 0, done.stderr
+    for frame in (14, 25):
+        rows = rows_at(frame)
+        assert [near(rows.boxes[rows.ids == name][0], frame, n) for n, name in enumerate((1, 4))] == [True, True]
+
+
+def test_a_mark_of_all_but_a_strip_and_of_one_pixel_ends_well(track):
+    strip = np.ones((80, 120), np.uint8)
+    strip[:, :2] = 0
+    cv2.imwrite("strip.png", strip)
+    one = np.zeros((80, 120), np.uint8)
+    one[40, 60] = 5
+    cv2.imwrite("one.png", one)
+    for name, area in (("strip", 118 * 80), ("one", 1)):
+        done = track("--init", f"{name}.png@10", "--no-video", "--overwrite")
+        assert done.code == 0, done.stderr
+        assert rows_at(10).masks[0].area == area
 
 
 def test_boxes_without_a_picture_are_marked_as_they_are(track, tmp_path):
