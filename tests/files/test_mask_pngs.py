@@ -19,7 +19,7 @@ from perdure.files.mask_pngs import pictures_in, read_masks, write_masks
 from perdure.types import Mask, Tracks, Use
 
 DATA = Path(os.environ.get("PERDURE_DATA", Path(__file__).parents[3] / "shared/data"))
-GREY, COLOUR, PALETTE, GREY_ALPHA = 0, 2, 3, 4
+GREY, PALETTE = 0, 3
 PICTURE = np.array([[0, 0, 1, 1], [2, 0, 1, 0], [2, 2, 0, 0]], np.uint8)
 
 
@@ -119,10 +119,23 @@ def test_two_pictures_of_one_frame_are_refused(tmp_path: Path):
 
 
 def test_a_picture_in_colour_is_refused_with_a_remedy(tmp_path: Path):
-    encoded = cv2.imencode(".png", np.zeros((3, 4, 3), np.uint8))[1].tobytes()
-    for colourful in (encoded, png(PICTURE, GREY_ALPHA)):
+    red = np.zeros((3, 4, 3), np.uint8)
+    red[1, 2, 2] = 9
+    half = np.full((3, 4, 4), 255, np.uint8)
+    half[0, 0, 3] = 128
+    for colourful in (red, half):
         with pytest.raises(FormatError, match=r"0\.png is in colour .*palette's index"):
-            read_masks(put(tmp_path, _0=colourful))
+            read_masks(put(tmp_path, _0=cv2.imencode(".png", colourful)[1].tobytes()))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_greys_that_were_saved_as_colours_are_ids(tmp_path: Path, kind: type, channels: int):
+    picture = np.zeros((3, 4, channels), kind)
+    picture[1:, 2:, :3] = 7
+    picture[..., 3:] = np.iinfo(kind).max
+    rows = read_masks(put(tmp_path, _0=cv2.imencode(".png", picture)[1].tobytes()))
+    assert (rows.ids.tolist(), rows.masks[0].box) == ([7], (2, 1, 4, 3))
 
 
 def test_a_picture_of_another_size_is_refused(tmp_path: Path):

@@ -105,7 +105,7 @@ def test_a_name_may_hold_an_at_sign(tmp_path: Path) -> None:
         ("f.png", np.full((4, 6), 3), "covers 100.0 % of the picture"),
         ("w.png", np.full((4, 6), 255), "covers 100.0 % of the picture"),
         ("l.png", np.ones((8, 6)), "the mask is 6x8, the video 6x4"),
-        ("c.png", np.ones((4, 6, 3)), "in colour"),
+        ("c.png", np.eye(6)[:4, :, None] * np.array([1, 2, 3]), "in colour"),
         ("s.png", np.arange(24).reshape(4, 6), "soft edges"),
         ("j.jpg", np.ones((4, 6)), "is not a PNG"),
     ],

@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,12 +195,16 @@ def silhouettes(picture: Indices) -> Iterator[tuple[int, Mask]]:
 
 
 def read_indices(path: Path) -> Indices:
-    """Return an index picture (H, W); FormatError for a file that is none."""
+    """Return an index picture (H, W); FormatError for a file that is none.
+
+    One that a paint program has saved in colours, all of them grey and opaque, is an index picture too.
+    """
     import cv2
 
     try:
         depth, plain = _without_palette(path.read_bytes())
-        picture = cv2.imdecode(np.frombuffer(plain, np.uint8), cv2.IMREAD_UNCHANGED)
+        decoded = cv2.imdecode(np.frombuffer(plain, np.uint8), cv2.IMREAD_UNCHANGED)
+        picture = None if decoded is None else _grey_of(decoded)
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:
@@ -212,6 +216,16 @@ def read_indices(path: Path) -> Indices:
     if depth < 8:  # the decoder spreads few bits over eight
         picture = picture // (255 // ((1 << depth) - 1))
     return cast("Indices", picture)
+
+
+def _grey_of(picture: NDArray[Any]) -> NDArray[Any]:
+    """Return the one channel (H, W) of a decoded picture; ValueError where it is in colour or has transparency."""
+    if picture.ndim == 2:
+        return picture
+    colours, alpha = picture[..., :3], picture[..., 3:]
+    if (colours != colours[..., :1]).any() or (alpha != np.iinfo(picture.dtype).max).any():
+        raise ValueError("is in colour or has transparency; write the ids as grey values or as a palette's index")
+    return np.ascontiguousarray(colours[..., 0])
 
 
 def _without_palette(encoded: bytes) -> tuple[int, bytes]:
@@ -227,11 +241,8 @@ def _without_palette(encoded: bytes) -> tuple[int, bytes]:
             width, height, depth, colours, *rest = struct.unpack(">IIBBBBB", body)
             if width * height > _LARGEST_AREA:
                 raise ValueError(f"cannot be read: a picture of {width}x{height}")
-            if colours not in (_GREY, _PALETTE):
-                raise ValueError(
-                    "is in colour or has transparency; write the ids as grey values or as a palette's index"
-                )
-            body = struct.pack(">IIBBBBB", width, height, depth, _GREY, *rest)
+            if colours == _PALETTE:
+                body = struct.pack(">IIBBBBB", width, height, depth, _GREY, *rest)
         if kind in (b"IHDR", b"IDAT", b"IEND"):
             kept.append(struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)))
     return depth, b"".join(kept)
