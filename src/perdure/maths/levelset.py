@@ -342,18 +342,22 @@ class _Band:
         self.phi, self.pixels = np.where(phi < 0, -band, band), np.empty(phi.size, np.int64)
         self.count = measure(self.phi, phi, ends, band, self.pixels, 0)
         self.band = band
-        self._before = self.phi.copy()
+        self._moved, self._measured = self.phi.copy(), self.phi.copy()  # before the last measuring, and after it
 
     def measure(self) -> float:
         """Make phi a distance again; return by how many pixels the contour has moved since the last time."""
         from perdure.maths.kernels.narrow_band import measure
 
-        ends, _ = _pieces(self.phi, self.pixels[: self.count])
-        self.count = measure(self.phi, self.phi.copy(), ends, self.band, self.pixels, self.count)
+        phi, moved, measured = (one.reshape(-1) for one in (self.phi, self._moved, self._measured))
+        left = self.pixels[: self.count].copy()
+        moved[left] = phi[left]
+        ends, _ = _pieces(self.phi, left)
+        self.count = measure(self.phi, self._moved, ends, self.band, self.pixels, self.count)
         pixels = self.pixels[: self.count]
-        now, before = self.phi.reshape(-1)[pixels], self._before.reshape(-1)[pixels]
-        way = np.abs(now - before)[np.abs(now) < 1].max(initial=0.0)
-        np.copyto(self._before, self.phi)
+        now = phi[pixels]
+        way = np.abs(now - measured[pixels])[np.abs(now) < 1].max(initial=0.0)
+        moved[left] = measured[left] = phi[left]  # of what has left the band, too; nothing else costs time
+        measured[pixels] = now
         return float(way) if self.count else self.band
 
 

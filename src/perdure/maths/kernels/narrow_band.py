@@ -124,8 +124,8 @@ def measure(phi: Float, held: Float, ends: Float, band: float, pixels: Index, co
     Parameters
     ----------
     phi : (H, W) float64, changed
-        Signs stay, but below CLOSEST; values become distances in pixels, or `band` where that is less. Beyond the pixels named, they
-        must be `band` or -`band`.
+        Signs stay, but below CLOSEST; values become distances in pixels, or `band` where that is less. Beyond the
+        pixels named, they must be `band` or -`band`.
     held : (H, W) float64
         What phi was.
     ends : (N, 4) float64
@@ -169,12 +169,17 @@ def measure(phi: Float, held: Float, ends: Float, band: float, pixels: Index, co
 @part
 def _settled(held: Float, y: int, x: int, distance: float) -> float:
     """What a pixel's distance from the polygon makes of what it was."""
-    here = held[y, x]
-    north, south = held[max(y - 1, 0), x], held[min(y + 1, held.shape[0] - 1), x]
-    west, east = held[y, max(x - 1, 0)], held[y, min(x + 1, held.shape[1] - 1)]
+    up, down, left, right = (
+        max(y - 1, 0),
+        min(y + 1, held.shape[0] - 1),
+        max(x - 1, 0),
+        min(x + 1, held.shape[1] - 1),
+    )
+    here, north, south, west, east = held[y, x], held[up, x], held[down, x], held[y, left], held[y, right]
     inside = here < 0
     if inside != (north < 0) or inside != (south < 0) or inside != (west < 0) or inside != (east < 0):
-        slope = np.sqrt((east - west) * (east - west) + (south - north) * (south - north)) / 2
+        slope_x, slope_y = (east - west) / max(right - left, 1), (south - north) / max(down - up, 1)
+        slope = np.sqrt(slope_x * slope_x + slope_y * slope_y)
         if abs(slope - 1) <= EVEN:
             distance = here
         elif slope > 0 and abs(here / slope - distance) <= SURE:

@@ -56,7 +56,10 @@ def measure_twin(phi: Float, held: Float, ends: Float, band: float, pixels: Inde
     around = np.pad(held, 1, mode="edge")
     north, south, west, east = around[:-2, 1:-1], around[2:, 1:-1], around[1:-1, :-2], around[1:-1, 2:]
     beside = np.logical_or.reduce([(one < 0) != (held < 0) for one in (north, south, west, east)])
-    slope = np.hypot(east - west, south - north) / 2
+    slope_y, slope_x = (
+        np.gradient(held, axis=axis) if held.shape[axis] > 1 else np.zeros(held.shape) for axis in (0, 1)
+    )
+    slope = np.hypot(slope_x, slope_y)
     apart = np.divide(held, slope, out=np.full(phi.shape, np.inf), where=slope > 0)
     sloped = np.where(np.abs(apart - signed) <= SURE, apart, signed)
     settled = np.where(
