@@ -103,6 +103,14 @@ def test_sparse_vectors_are_where_the_contrast_is():
     assert not found.valid[:, 100:].any()
 
 
+def test_without_a_way_back_valid_is_what_comes_from_inside_the_picture():
+    before, now = textured(), warp(textured(), about(2, 1.02, 3, 1))
+    one, other = dense(before, now, astray=np.inf), dense(before, now, astray=1e6)
+    np.testing.assert_array_equal(one.vectors, other.vectors)
+    np.testing.assert_array_equal(one.valid, other.valid)
+    assert 0.9 < one.valid.mean() < 1.0
+
+
 def test_along_a_straight_edge_nothing_is_claimed():
     before, now = np.zeros((2, 120, 160), np.uint8)
     before[:, 80:] = 200

@@ -120,7 +120,8 @@ def dense(
     preset : {'fast', 'medium'}
         OpenCV's: 'medium' is finer and takes several times as long.
     astray : float
-        Pixels by which there and back may differ; what has come into sight or gone out of it is not valid.
+        Pixels by which there and back may differ; what has come into sight or gone out of it is not valid. `inf`
+        asks for no way back, in half the time: valid is what comes from inside the picture.
 
     Returns
     -------
@@ -144,13 +145,15 @@ def dense(
         return _nothing(current.shape)
     search = cv2.DISOpticalFlow.create(presets[preset])
     before, now = np.ascontiguousarray(previous), np.ascontiguousarray(current)
-    there, back = search.calc(now, before, None), search.calc(before, now, None)  # type: ignore[call-overload]
+    there = search.calc(now, before, None)  # type: ignore[call-overload]
     x = there[..., 0] + np.arange(width, dtype=np.float32)
     y = there[..., 1] + np.arange(height, dtype=np.float32)[:, None]
-    back = cv2.remap(back, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # on the current picture
-    inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
-    off = there + back
-    valid: Bits = inside & (off[..., 0] ** 2 + off[..., 1] ** 2 < astray**2)
+    valid: Bits = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
+    if np.isfinite(astray):
+        back = search.calc(before, now, None)  # type: ignore[call-overload]
+        back = cv2.remap(back, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # on the current picture
+        off = there + back
+        valid &= off[..., 0] ** 2 + off[..., 1] ** 2 < astray**2
     return Flow(np.where(valid[..., None], -there, np.float32(0)), valid)
 
 

@@ -70,5 +70,5 @@ def look_at(image: Image) -> Sight:
 def motion_between(before: NDArray[np.uint8], now: Sight, things: Bits) -> Motion:
     """Return the motion from a small grey picture (h, w) to a frame; `things` (h, w) do not tell of the camera's."""
     return Motion(
-        dense(before, now.grey, preset="medium", astray=1e6), global_motion(before, now.grey, things), now.step
+        dense(before, now.grey, preset="medium", astray=np.inf), global_motion(before, now.grey, things), now.step
     )
