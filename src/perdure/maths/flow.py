@@ -278,10 +278,8 @@ def _robust(begin: Float, end: Float) -> tuple[Float, Bits]:
     triples = np.random.default_rng(0).integers(
         0, len(begin), (_SAMPLES, 3)
     )  # its own generator, the same each time
-    tried = [_affine(begin[rows], end[rows], np.ones(3)) for rows in triples]
-    tried.append(np.eye(2, 3))
-    off = np.stack([_off(one, begin, end) for one in tried])  # (S, N)
-    medians = np.median(off, axis=1)
+    tried = np.concatenate([_affine(begin[triples], end[triples], np.ones((_SAMPLES, 3))), np.eye(2, 3)[None]])
+    medians = np.median(_off(tried, begin, end), axis=1)  # (S,)
     found, spread = tried[int(medians.argmin())], float(medians.min())
     for _ in range(10):
         scale = max(4.685 * 1.4826 * spread / np.sqrt(2), 0.5)  # of Tukey's biweight, in pixels
@@ -295,16 +293,17 @@ def _robust(begin: Float, end: Float) -> tuple[Float, Bits]:
 
 
 def _off(affine: Float, begin: Float, end: Float) -> Float:
-    """Distances (N,) in pixels of points from where an affine map takes them."""
-    return np.asarray(np.hypot(*(begin @ affine[:, :2].T + affine[:, 2] - end).T), np.float64)
+    """Distances (..., N) in pixels of points from where affine maps (..., 2, 3) take them."""
+    moved = begin @ affine[..., :2].swapaxes(-1, -2) + affine[..., None, :, 2] - end  # (..., N, 2)
+    return np.asarray(np.hypot(moved[..., 0], moved[..., 1]), np.float64)
 
 
 def _affine(begin: Float, end: Float, weights: Float) -> Float:
-    """The affine map (2, 3) by least squares; the less the points spread, the nearer to a translation."""
-    share = weights / weights.sum()
-    middle, goal = share @ begin, share @ end
+    """The affine maps (..., 2, 3) by least squares; the less the points spread, the nearer to a translation."""
+    share = (weights / weights.sum(axis=-1, keepdims=True))[..., None, :]  # (..., 1, N)
+    middle, goal = share @ begin, share @ end  # (..., 1, 2)
     x, y = begin - middle, end - goal - (begin - middle)  # what is beyond a translation
-    weighted = x * weights[:, None]
-    turned = np.linalg.solve(weighted.T @ x + _STIFF * np.eye(2), weighted.T @ y).T
-    linear = np.eye(2) + turned
-    return np.column_stack([linear, goal - linear @ middle])
+    weighted = (x * weights[..., None]).swapaxes(-1, -2)  # (..., 2, N)
+    turned = np.linalg.solve(weighted @ x + _STIFF * np.eye(2), weighted @ y)  # (..., 2, 2), its columns
+    linear = np.eye(2) + turned.swapaxes(-1, -2)
+    return np.concatenate([linear, (goal - middle @ linear.swapaxes(-1, -2)).swapaxes(-1, -2)], axis=-1)
