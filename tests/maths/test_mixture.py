@@ -13,8 +13,10 @@ from perdure.maths.kernels.mixtures import (
     expect_twin,
     log_densities,
     log_densities_twin,
+    log_ratios,
+    log_ratios_twin,
 )
-from perdure.maths.mixture import LEAST, Mixture, fit, log_density, subsample
+from perdure.maths.mixture import LEAST, Mixture, fit, log_density, log_ratio, subsample
 
 
 def some_mixture(rng: np.random.Generator, components: int, dimensions: int) -> Mixture:
@@ -65,6 +67,20 @@ def test_log_densities_are_those_of_the_twin(seed, components, dimensions, count
         room = np.full((components + 2 + dimensions, BLOCK), np.nan, np.float32)
         results.append(np.full(count, np.nan, np.float32))
         function(points, *forms, np.float32(-20), room, results[-1])
+    np.testing.assert_allclose(*results, atol=2e-4)
+
+
+@quick
+@given(st.integers(0, 2**32 - 1), st.lists(st.integers(0, 3), min_size=2, max_size=5), st.integers(1, 3))
+def test_log_ratios_are_those_of_the_twin(seed, sizes, dimensions):
+    rng = np.random.default_rng(seed)
+    points, *forms = kernel_arguments(seed, sum(sizes), dimensions, BLOCK + 7, np.float32)
+    least = rng.uniform(-15, -3, len(sizes)).astype(np.float32)
+    results = []
+    for function in (log_ratios, log_ratios_twin):
+        room = np.full((sum(sizes) + 5 + dimensions, BLOCK), np.nan, np.float32)
+        results.append(np.full(len(points), np.nan, np.float32))
+        function(points, *forms, np.cumsum(sizes), least, len(sizes) // 2, np.float32(6), room, results[-1])
     np.testing.assert_allclose(*results, atol=2e-4)
 
 
@@ -158,6 +174,26 @@ def test_without_points_nothing_is_known_but_what_was_known():
     assert (log_density(none, np.zeros((4, 3))) == LEAST).all()
     assert fit(np.full((5, 3), np.nan), 10, start=before) is before
     assert len(fit(np.random.default_rng(0).normal(0, 5, (100, 3)), 2, start=none)) == 2
+
+
+def test_a_ratio_of_sums_is_what_their_densities_say():
+    rng = np.random.default_rng(1)
+    one, other, third = (some_mixture(rng, number, 3) for number in (3, 5, 1))
+    points = drawn(one, rng, 500)
+    above = np.logaddexp(
+        log_density(one, points) + np.log(0.8), log_density(Mixture.empty(3), points) + np.log(0.2)
+    )
+    below = np.logaddexp(log_density(other, points), log_density(third, points) + np.log(0.1))
+    said = log_ratio(points, [(one, 0.8), (Mixture.empty(3), 0.2)], [(other, 1.0), (third, 0.1)], 5.0)
+    np.testing.assert_allclose(said, np.clip(above - below, -5, 5), atol=1e-4)
+    assert np.abs(said).max() == 5.0
+
+
+def test_where_nothing_is_known_neither_is_likelier():
+    none = [(Mixture.empty(3), 1.0)]
+    np.testing.assert_array_equal(log_ratio(np.full((2, 4, 3), 7.0), none, none, 4.0), np.zeros((2, 4)))
+    known = [(some_mixture(np.random.default_rng(0), 2, 3), 1.0)]
+    np.testing.assert_array_equal(log_ratio([[np.nan, 0, 0], [1e30, 0, 0]], known, none, 4.0), [0, 0])
 
 
 def test_what_is_no_number_is_left_out_and_least_likely():

@@ -12,6 +12,7 @@ were added.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -47,6 +48,9 @@ class Mixture:
     def empty(dimensions: int) -> Mixture:
         """Return the mixture of no components: of what nothing is known."""
         return Mixture(np.zeros(0), np.zeros((0, dimensions)), np.zeros((0, dimensions, dimensions)))
+
+
+Sum = Sequence[tuple[Mixture, float]]  # of densities, each with what it counts for
 
 
 def fit(
@@ -132,12 +136,7 @@ def log_density(mixture: Mixture, points: ArrayLike) -> Single:
     """
     from perdure.maths.kernels.mixtures import BLOCK, log_densities
 
-    given = np.asarray(points)
-    if given.shape[-1:] != mixture.means.shape[1:]:
-        raise ParameterError(
-            f"points have the shape {given.shape}; the mixture has {mixture.means.shape[1]} dimensions"
-        )
-    places = np.ascontiguousarray(given.reshape(-1, given.shape[-1]), np.float32)  # (N, D)
+    places = _places(points, mixture)
     out = np.empty(len(places), np.float32)
     heights, factors = _forms(mixture)
     log_densities(
@@ -149,7 +148,59 @@ def log_density(mixture: Mixture, points: ArrayLike) -> Single:
         np.empty((len(mixture) + 2 + places.shape[1], BLOCK), np.float32),
         out,
     )
-    return out.reshape(given.shape[:-1])
+    return out.reshape(np.shape(points)[:-1])
+
+
+def log_ratio(points: ArrayLike, own: Sum, other: Sum, bound: float) -> Single:
+    """Return the logarithm of the ratio of two sums of densities at points.
+
+    Parameters
+    ----------
+    points : (N, D) array, or a picture (H, W, D)
+        Any numbers; counted in float32.
+    own, other : sequences of (Mixture, float)
+        At least one of each, of D dimensions, and what it counts for, > 0. None's density is less than exp(LEAST).
+    bound : float
+        ≥ 0.
+
+    Returns
+    -------
+    (N,) float32, or (H, W)
+        Within ± bound.
+
+    Raises
+    ------
+    ParameterError
+        Points of another number of dimensions.
+
+    Examples
+    --------
+    >>> near, far = (Mixture(np.ones(1), np.full((1, 1), x), np.ones((1, 1, 1))) for x in (0.0, 2.0))
+    >>> log_ratio([[0.0], [1.0], [9.0]], [(near, 1.0)], [(far, 1.0)], 4.0).round(3).tolist()
+    [2.0, 0.0, -4.0]
+    """
+    from perdure.maths.kernels.mixtures import BLOCK, log_ratios
+
+    every = [*own, *other]
+    mixtures, shares = [one for one, _ in every], np.log([share for _, share in every])
+    sizes = [len(one) for one in mixtures]
+    all_of_them = Mixture(*(np.concatenate(columns) for columns in zip(*map(_columns, mixtures), strict=True)))
+    places = _places(points, all_of_them)
+    heights, factors = _forms(all_of_them)
+    out = np.empty(len(places), np.float32)
+    log_ratios(
+        places,
+        (heights + np.repeat(shares, sizes)).astype(np.float32),
+        all_of_them.means.astype(np.float32),
+        factors.astype(np.float32),
+        np.cumsum(sizes),
+        (LEAST + shares).astype(np.float32),
+        len(own),
+        np.float32(bound),
+        np.empty((len(all_of_them) + 5 + places.shape[1], BLOCK), np.float32),
+        out,
+    )
+    return out.reshape(np.shape(points)[:-1])
 
 
 def subsample(points: NDArray[Row], most: int) -> NDArray[Row]:
@@ -195,6 +246,20 @@ def _checked(
     if not used.all():
         every, counts = every[used], counts[used]
     return every, counts, np.sqrt(np.broadcast_to(least, every.shape[1:]))
+
+
+def _places(points: ArrayLike, mixture: Mixture) -> Single:
+    """Points (N, D) as the kernels take them; refused if the mixture has other dimensions."""
+    given = np.asarray(points)
+    if given.shape[-1:] != mixture.means.shape[1:]:
+        raise ParameterError(
+            f"points have the shape {given.shape}; the mixture has {mixture.means.shape[1]} dimensions"
+        )
+    return np.ascontiguousarray(given.reshape(-1, given.shape[-1]), np.float32)
+
+
+def _columns(mixture: Mixture) -> tuple[Float, Float, Float]:
+    return mixture.weights, mixture.means, mixture.covariances
 
 
 def _scaled(mixture: Mixture, unit: Float) -> Mixture:

@@ -125,6 +125,90 @@ def log_densities(
             out[begin + i] = found if found > least else least
 
 
+@kernel_for(
+    given(np.float32, 2, "C"),
+    given(np.float32, 1, "C"),
+    given(np.float32, 2, "C"),
+    given(np.float32, 3, "C"),
+    given(np.int64),
+    given(np.float32),
+    int,
+    np.float32,
+    changed(np.float32, 2),
+    changed(np.float32),
+)
+def log_ratios(
+    points: NDArray[np.float32],
+    heights: NDArray[np.float32],
+    means: NDArray[np.float32],
+    factors: NDArray[np.float32],
+    ends: NDArray[np.int64],
+    least: NDArray[np.float32],
+    ours: int,
+    bound: np.float32,
+    room: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Write the log ratio of two sums of mixtures at every point, within ± bound.
+
+    Parameters
+    ----------
+    points, heights, means, factors : float32
+        As in `_terms`, the components of all mixtures; what a mixture counts for is in its heights.
+    ends : (M,) int64
+        Where each mixture's components end.
+    least : (M,) float32
+        What each mixture's log density is at least, with what it counts for.
+    ours : int
+        So many of the mixtures, the first, are above the line, the others below; of either at least one.
+    bound : float32
+        ≥ 0.
+    room : (K + 5 + D, BLOCK) float32, changed
+        Scratch.
+    out : (N,) float32, changed
+        Every element is written.
+    """
+    components, mixtures, smallest = heights.shape[0], ends.shape[0], np.float32(0.0)
+    best, part, total = room[components], room[components + 1], room[components + 2]
+    ours_best, above, block = room[components + 3], room[components + 4], room[components + 5 :]
+    enough = bound + np.float32(np.log(components + mixtures))
+    for begin in range(0, points.shape[0], BLOCK):
+        count = min(BLOCK, points.shape[0] - begin)
+        for i in range(count):
+            for d in range(points.shape[1]):
+                block[d, i] = points[begin + i, d]
+        _terms(block, count, heights, means, factors, room)
+        for side in range(2):
+            first, last = (0, ours) if side == 0 else (ours, mixtures)
+            top = least[first]
+            for m in range(first, last):
+                top = max(top, least[m])
+            for i in range(count):
+                best[i], total[i] = top, smallest
+            for k in range(ends[first - 1] if first > 0 else 0, ends[last - 1]):
+                row = room[k]
+                for i in range(count):
+                    best[i] = row[i] if row[i] > best[i] else best[i]
+            for m in range(first, last):
+                for i in range(count):
+                    part[i] = smallest
+                for k in range(ends[m - 1] if m > 0 else 0, ends[m]):
+                    row = room[k]
+                    for i in range(count):
+                        part[i] += _share(row[i] - best[i])
+                for i in range(count):
+                    lowest = _share(least[m] - best[i])
+                    total[i] += part[i] if part[i] > lowest else lowest
+            if side == 0:
+                for i in range(count):
+                    above[i], ours_best[i] = total[i], best[i]
+        for i in range(count):
+            ratio = ours_best[i] - best[i]  # of the largest terms; the sums are 1 to K + M times as large
+            if abs(ratio) < enough:
+                ratio += np.log(above[i] / total[i])
+            out[begin + i] = min(max(ratio, -bound), bound)
+
+
 @kernel
 def _share(log: np.float32) -> np.float32:
     """Return exp of a number ≤ 0, to within 5e-6 of its value: exp(log / 64) by its series, squared six times.
@@ -232,6 +316,31 @@ def log_densities_twin(
     _terms_twin(points.T, len(points), heights, means, factors, every)
     found = np.logaddexp.reduce(every, axis=0)
     out[...] = np.where(found > least, found, least)
+
+
+def log_ratios_twin(
+    points: NDArray[np.float32],
+    heights: NDArray[np.float32],
+    means: NDArray[np.float32],
+    factors: NDArray[np.float32],
+    ends: NDArray[np.int64],
+    least: NDArray[np.float32],
+    ours: int,
+    bound: np.float32,
+    room: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Do the same in NumPy: the oracle of `log_ratios`."""
+    every = np.empty((len(heights), len(points)))
+    _terms_twin(points.T, len(points), heights, means, factors, every)
+    each = np.stack(
+        [
+            np.maximum(np.logaddexp.reduce(one, axis=0, initial=-np.inf), lowest)
+            for one, lowest in zip(np.split(every, ends[:-1]), least, strict=True)
+        ]
+    )
+    ratio = np.logaddexp.reduce(each[:ours], axis=0) - np.logaddexp.reduce(each[ours:], axis=0)
+    out[...] = np.clip(ratio, -bound, bound)
 
 
 def expect_twin(

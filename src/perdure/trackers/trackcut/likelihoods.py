@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.mixture import Mixture, fit, log_density, subsample
+from perdure.maths.mixture import Mixture, fit, log_ratio, subsample
 from perdure.trackers.trackcut.targets import Colours
 
 Float = NDArray[np.float32]
 _SAMPLE = 2000  # pixels a mixture is fitted to, at most
 _FLOOR = 4.0  # least variance of colours
 _STEPS = 4  # of EM
+_LEAST_TRUST = 1e-9  # in either looks
 _STILL = 0.4  # px a frame by which flow errs at least
 _ROUGH = 0.1  # share of a motion by which parts of an object differ from it
 
@@ -39,13 +40,9 @@ def _fitted(points: Float, components: int, start: Mixture | None) -> Mixture:
 
 def of_colours(points: Float, first: Colours, last: Colours, trust: float, bound: float) -> Float:
     """Return ln p / q (N,) of colours (N, 3), within ± bound: of the looks at first, `trust`, and at last (eq. 8)."""
-    own = _either(log_density(first.own, points), log_density(last.own, points), trust)
-    other = _either(log_density(first.other, points), log_density(last.other, points), trust)
-    return np.asarray(np.clip(own - other, -bound, bound), np.float32)
-
-
-def _either(first: Float, last: Float, trust: float) -> Float:
-    return np.asarray(np.logaddexp(first + np.log(trust + 1e-9), last + np.log(1 - trust + 1e-9)), np.float32)
+    sure, unsure = trust + _LEAST_TRUST, 1 - trust + _LEAST_TRUST
+    own, other = ([(first.own, sure), (last.own, unsure)], [(first.other, sure), (last.other, unsure)])
+    return log_ratio(points, own, other, bound)
 
 
 def of_motions(flow: Float, sure: NDArray[np.bool_], bound: float, known: Float | None = None) -> Float:
