@@ -39,7 +39,7 @@ def _fitted(points: Float, components: int, start: Mixture | None) -> Mixture:
 
 
 def of_colours(points: Float, first: Colours, last: Colours, trust: float, bound: float) -> Float:
-    """Return ln p / q (N,) of colours (N, 3), within ± bound: of the looks at first, `trust`, and at last (eq. 8)."""
+    """Return ln p / q (…) of colours (…, 3), within ± bound: of the looks at first, `trust`, and at last (eq. 8)."""
     sure, unsure = trust + _LEAST_TRUST, 1 - trust + _LEAST_TRUST
     own, other = ([(first.own, sure), (last.own, unsure)], [(first.other, sure), (last.other, unsure)])
     return log_ratio(points, own, other, bound)
@@ -53,11 +53,11 @@ def of_motions(flow: Float, sure: NDArray[np.bool_], bound: float, known: Float 
     """
     if known is None and not sure.any():
         return np.zeros(flow.shape[:2], np.float32)
-    own = flow[sure] if known is None else known[None]
-    middle = np.median(own, axis=0)
-    spread = np.maximum(1.5 * np.median(np.abs(own - middle), axis=0), _STILL) + _ROUGH * np.abs(middle)
-    far = (((flow - middle) / spread) ** 2).sum(axis=2)
-    rest = (flow**2).sum(axis=2) / _STILL**2
-    own_log = -1.5 * np.log1p(far / 2) - np.log(spread).sum()
-    rest_log = -1.5 * np.log1p(rest / 2) - 2 * np.log(_STILL)
-    return np.asarray(np.clip(own_log - rest_log, -bound, bound), np.float32)
+    from perdure.maths.kernels.tails import student_ratios
+
+    own = np.ascontiguousarray((flow[sure] if known is None else known[None]).T)  # (2, n)
+    middle = np.median(own, axis=1)
+    spread = np.maximum(1.5 * np.median(np.abs(own - middle[:, None]), axis=1), _STILL) + _ROUGH * np.abs(middle)
+    out = np.empty(flow.shape[:2], np.float32)
+    student_ratios(np.ascontiguousarray(flow), middle, spread, np.float32(_STILL), np.float32(bound), out)
+    return out
