@@ -9,17 +9,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.trackers.trackcut import places
 from perdure.trackers.trackcut.likelihoods import of_colours, of_motions
+from perdure.trackers.trackcut.moving import similarity
+from perdure.trackers.trackcut.places import vote
 from perdure.trackers.trackcut.seeing import Motion, Sight
-from perdure.trackers.trackcut.shapes import depth, in_window, recent_motion, similarity
+from perdure.trackers.trackcut.shapes import depth, in_window, recent_motion
 from perdure.trackers.trackcut.targets import Target
-from perdure.trackers.trackcut.windows import Window, around
+from perdure.trackers.trackcut.windows import ONE_MAP, Window, around
 
 Float = NDArray[np.float32]
 Bits = NDArray[np.bool_]
 Similarity = tuple[NDArray[np.float64], tuple[float, float]]
-_CORE = 1.0  # cells from the edge, from which flow is the object's own
+_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))  # flow is the object's own where all of it is
 _ENOUGH = 30  # cells of core
 _MARGIN = 2.0  # cells by which the remembered silhouette counts for less than the last one
 _HALF = 0.5  # share of the remembered silhouette below which the last one is not enough
@@ -93,30 +94,32 @@ def expect(
     """
     drift = carried(target, motion)
     window = _window(target, drift, ring, cells, sight)
-    x, y = window.places()
+    places = window.grid()  # (h, w, 2)
     flow = motion.at(window)  # (h, w, 2)
-    camera = motion.of_camera(x, y)
-    came = np.stack([x - flow[..., 0], y - flow[..., 1]], axis=2)  # where each cell was
+    camera = motion.of_camera_at(places)
+    came = places - flow  # where each cell was
     last = _carry_mask(target, window, came)
-    move, moved = _movement(target, drift, (x, y), flow, camera, depth(last) > _CORE)
+    move, moved = _movement(target, drift, places, flow, motion, _core(last))
     belief = in_window(target.shape, window, move)
     whole = belief > 0.5
-    lost = last.sum() < _HALF * whole.sum()
+    lost = np.count_nonzero(last) < _HALF * np.count_nonzero(whole)
     predicted = whole if target.together and whole.any() else last | whole if lost else last
     if not predicted.any():
         predicted = whole
     colours = window.cut(sight.colours)
-    points = colours.reshape(-1, 3).astype(np.float32)
-    looks = of_colours(points, target.first, target.last, weights.trust, weights.bound).reshape(window.shape)
-    sure = depth(predicted) > _INNER
+    seen = colours.astype(np.float32)
+    looks = of_colours(seen, target.first, target.last, weights.trust, weights.bound)
+    inner = depth(predicted)
+    sure = inner > _INNER
     own = None if not lost else recent_motion(target).astype(np.float32)
     motions = of_motions(flow - camera, sure if sure.any() else predicted, weights.bound, own)
-    votes = _votes(before, window, came, last, colours, weights.bound) if not lost else np.zeros_like(looks)
-    away = np.maximum(depth(predicted), depth(whole) - _MARGIN)
-    slope = max(_SLOPE * float(np.sqrt(max(predicted.sum(), whole.sum()))), _LEAST_SLOPE)
-    shape = np.clip(away / slope, -_SURE, _SURE)
+    votes = _votes(before, came, last, colours, weights.bound) if not lost else np.zeros_like(looks)
+    away = np.maximum(inner, (inner if predicted is whole else depth(whole)) - np.float32(_MARGIN))
+    size = max(np.count_nonzero(predicted), np.count_nonzero(whole))
+    slope = max(_SLOPE * float(np.sqrt(size)), _LEAST_SLOPE)
+    shape = np.clip(away / np.float32(slope), -_SURE, _SURE)
     evidence = weights.colour * looks + weights.place * votes + weights.motion * motions + weights.shape * shape
-    return Expected(window, colours.astype(np.float32), last, belief, predicted, moved, -evidence)
+    return Expected(window, seen, last, belief, predicted, moved, -evidence)
 
 
 def _window(target: Target, drift: NDArray[np.float64], ring: float, cells: int, sight: Sight) -> Window:
@@ -129,15 +132,23 @@ def _window(target: Target, drift: NDArray[np.float64], ring: float, cells: int,
 
 
 def _movement(
-    target: Target, drift: NDArray[np.float64], at: tuple[Float, Float], flow: Float, camera: Float, core: Bits
+    target: Target, drift: NDArray[np.float64], places: Float, flow: Float, motion: Motion, core: Bits
 ) -> tuple[Similarity, NDArray[np.float64]]:
     """How the object has moved: a similarity, and (2,) px beyond the camera's; as before where little of it is seen."""
-    if core.sum() > _ENOUGH and not target.partly:
-        move = similarity(at[0][core], at[1][core], flow[core])
-        return move, np.asarray(move[0][:2] - camera[core].mean(axis=0), np.float64)
+    own = np.flatnonzero(core)
+    if len(own) > _ENOUGH and not target.partly:
+        at = places.reshape(-1, 2)[own]
+        move = similarity(at[:, 0], at[:, 1], flow.reshape(-1, 2)[own])
+        camera = motion.of_camera_at(np.array([move[1]], np.float32))[0]  # in the middle it is as in the mean
+        return move, np.asarray(move[0][:2] - camera, np.float64)
     x, y = middle_of(target)
     move = (np.array([drift[0], drift[1], 0.0, 0.0]), (x + float(drift[0]), y + float(drift[1])))
     return move, recent_motion(target)
+
+
+def _core(inside: Bits) -> Bits:
+    """The pixels whose four neighbours are the object's too."""
+    return cv2.erode(inside.view(np.uint8), _CROSS).view(np.bool_)
 
 
 def _carry_mask(target: Target, window: Window, came: Float) -> Bits:
@@ -149,9 +160,7 @@ def _carry_mask(target: Target, window: Window, came: Float) -> Bits:
     return np.asarray(cv2.remap(bits, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0) > 0.5)
 
 
-def _votes(
-    before: NDArray[np.uint8], window: Window, came: Float, own: Bits, colours: NDArray[np.uint8], bound: float
-) -> Float:
+def _votes(before: NDArray[np.uint8], came: Float, own: Bits, colours: NDArray[np.uint8], bound: float) -> Float:
     """Votes of the frame before, its pixels where they are now."""
-    was = cv2.remap(before, came[..., 0], came[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-    return places.vote(np.asarray(was, np.uint8), own, colours, bound)
+    was = cv2.remap(before, came, ONE_MAP, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    return vote(np.asarray(was, np.uint8), own, colours, bound)

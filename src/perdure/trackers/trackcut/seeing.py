@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths.flow import Flow, dense, global_motion
-from perdure.trackers.trackcut.windows import Window
+from perdure.trackers.trackcut.windows import ONE_MAP, Window
 from perdure.types import Bits, Image
 
 Float = NDArray[np.float32]
@@ -33,29 +33,22 @@ class Motion(NamedTuple):
 
     def at(self, window: Window) -> Float:
         """Return the displacement (h, w, 2), px a frame, of what is now in each cell of a window."""
-        x, y = window.places()
-        half = (self.step - 1) / 2
-        return cv2.remap(
-            self.flow.vectors,
-            (x - half) / self.step,
-            (y - half) / self.step,
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        ) * np.float32(self.step)
+        half = np.float32((self.step - 1) / 2)
+        there = (window.grid() - half) / np.float32(self.step)
+        moved = cv2.remap(self.flow.vectors, there, ONE_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return moved * np.float32(self.step)
 
     def of_camera(self, x: Float, y: Float) -> Float:
         """Return the displacement (…, 2), px a frame, that the camera's motion gives what is now at x, y."""
+        return self.of_camera_at(np.stack([x, y], axis=-1))
+
+    def of_camera_at(self, places: Float) -> Float:
+        """Return the same of what is now at places (…, 2)."""
         half = (self.step - 1) / 2
         back = cv2.invertAffineTransform(self.camera)
-        u, v = (x - half) / self.step, (y - half) / self.step
-        moved = np.stack(
-            [
-                u - (back[0, 0] * u + back[0, 1] * v + back[0, 2]),
-                v - (back[1, 0] * u + back[1, 1] * v + back[1, 2]),
-            ],
-            axis=-1,
-        )
-        return np.asarray(moved * self.step, np.float32)
+        away = np.eye(2, 3) - back  # (2, 3), what is there less what was
+        away[:, 2] = away[:, 2] * self.step - away[:, :2] @ (half, half)
+        return np.asarray(cv2.transform(places.reshape(-1, 1, 2), away), np.float32).reshape(places.shape)
 
 
 def look_at(image: Image) -> Sight:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from perdure.types import Bits, Mask
 
+ONE_MAP: Any = None  # the second map of cv2.remap, where the first has both x and y; OpenCV's stubs want two
+
 
 class Window(NamedTuple):
     """Pixels x1 … x2, y1 … y2 of a picture, seen in cells of `step` x `step` pixels; sides are multiples of it."""
@@ -62,9 +64,17 @@ class Window(NamedTuple):
 
     def places(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return x and y (h, w) of the middles of the cells, pixels."""
-        y, x = np.mgrid[: self.shape[0], : self.shape[1]].astype(np.float32)
+        both = self.grid()
+        return both[..., 0].copy(), both[..., 1].copy()
+
+    def grid(self) -> NDArray[np.float32]:
+        """Return x, y (h, w, 2) of the middles of the cells, pixels."""
+        height, width = self.shape
         half = (self.step - 1) / 2
-        return x * self.step + self.x1 + half, y * self.step + self.y1 + half
+        both = np.empty((height, width, 2), np.float32)
+        both[..., 0] = np.arange(width, dtype=np.float32) * self.step + np.float32(self.x1 + half)
+        both[..., 1] = (np.arange(height, dtype=np.float32) * self.step + np.float32(self.y1 + half))[:, None]
+        return both
 
 
 def around(boxes: Sequence[Sequence[float]], ring: float, cells: int, size: tuple[int, int]) -> Window:
