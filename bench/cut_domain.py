@@ -19,9 +19,9 @@ from unittest import mock
 import numpy as np
 from regions import Table
 
+from perdure.maths.maxflow import STEPS
 from perdure.trackers.trackcut import expecting
 from perdure.trackers.trackcut import tracker as trackcut
-from perdure.trackers.trackcut.cutting import STEPS
 from perdure.trackers.trackcut.expecting import Expected
 from perdure.trackers.trackcut.windows import Window
 from perdure.types import Frame, Mask, Regions, Scene

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from perdure.maths.maxflow import Nodes, cut, nodes_of
 
 Float = NDArray[np.float32]
-STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))  # rows, columns to the neighbours E, S, SE, SW
 _RING = 2  # cells along the window's sides that are background for certain
 _NEVER = 1000.0  # what it costs to take them
 
@@ -34,18 +33,16 @@ class Found(NamedTuple):
 
 def contrast(colours: Float, weight: float) -> tuple[Float, float]:
     """Return the costs (4, h, w) of neighbours that differ, and σ² (eq. 10, with σ² = 4 <|z_s - z_r|²>)."""
+    from perdure.maths.kernels.differences import squared_differences
+
     height, width = colours.shape[:2]
-    squares = np.zeros((4, height, width), np.float32)
-    total, count = 0.0, 0
-    for place, (down, right) in enumerate(STEPS):
-        left, end = max(0, -right), width - max(0, right)
-        off = colours[: height - down, left:end] - colours[down:, left + right : end + right]
-        part = np.einsum("yxc,yxc->yx", off, off)
-        squares[place, : height - down, left:end] = part
-        total, count = total + float(part.sum(dtype=np.float64)), count + part.size
+    costs = np.empty((4, height, width), np.float32)
+    total = squared_differences(np.ascontiguousarray(colours, np.float32), costs)  # of squares, so far
+    count = 4 * height * width - 3 * (height + width) + 2
     sigma = max(4.0 * total / max(count, 1), 1e-3)
-    costs = np.exp(squares / -np.float32(sigma)) * np.float32(weight)
-    costs[2:] /= np.float32(np.sqrt(2.0))
+    np.exp(np.divide(costs, -np.float32(sigma), out=costs), out=costs)
+    costs[:2] *= np.float32(weight)
+    costs[2:] *= np.float32(weight / np.sqrt(2.0))
     return costs, sigma
 
 
@@ -70,10 +67,9 @@ def cut_out(
         Largest evidence of an observation for each of its pixels, nats.
     """
     data = unary.astype(np.float64)
-    ring = np.zeros(data.shape, np.bool_)
-    ring[:_RING], ring[-_RING:], ring[:, :_RING], ring[:, -_RING:] = True, True, True, True
-    free = ~ring if ring.size > ring.sum() else np.ones_like(ring)
-    data[~free] = _NEVER
+    ringed = min(data.shape) > 2 * _RING
+    if ringed:
+        data[:_RING], data[-_RING:], data[:, :_RING], data[:, -_RING:] = (_NEVER,) * 4
     nodes: Nodes | None = None
     if observed:
         links: list[tuple[ArrayLike, ArrayLike]] = []
@@ -85,15 +81,16 @@ def cut_out(
         ratios = np.clip([one.ratio for one in observed], -bound, bound)
         nodes = nodes_of(-ratios * sizes, links)
     best = cut(data, costs.astype(np.float64), nodes)
-    inner = cv2.dilate(best.labels.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    touches = bool((inner & ~free).any())
+    near = _RING + 1
+    sides = (best.labels[:near], best.labels[-near:], best.labels[:, :near], best.labels[:, -near:])
+    touches = ringed and any(bool(side.any()) for side in sides)
     return Found(best.labels, tuple(bool(one) for one in best.node_labels), touches)
 
 
 def touching(cells: NDArray[np.bool_], anchors: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the connected parts (h, w) of an object that meet its prediction or a matched observation."""
-    count, part = cv2.connectedComponents(cells.astype(np.uint8), connectivity=8)
+    count, part = cv2.connectedComponents(cells.view(np.uint8), connectivity=8)
     kept = np.zeros(count, np.bool_)
-    kept[np.unique(part[anchors])] = True
+    kept[part[anchors]] = True
     kept[0] = False
     return np.asarray(kept[part], np.bool_)

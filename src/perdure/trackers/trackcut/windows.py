@@ -42,12 +42,13 @@ class Window(NamedTuple):
 
     def of_mask(self, mask: Mask) -> NDArray[np.float32]:
         """Return the share (h, w) of each cell that a mask covers."""
-        bits = np.zeros((self.y2 - self.y1, self.x2 - self.x1), np.float32)
         x1, y1 = max(mask.box[0], self.x1), max(mask.box[1], self.y1)
         x2, y2 = min(mask.box[2], self.x2), min(mask.box[3], self.y2)
-        if x1 < x2 and y1 < y2:
-            part = mask.bits[y1 - mask.y : y2 - mask.y, x1 - mask.x : x2 - mask.x]
-            bits[y1 - self.y1 : y2 - self.y1, x1 - self.x1 : x2 - self.x1] = part
+        if x1 >= x2 or y1 >= y2:
+            return np.zeros(self.shape, np.float32)
+        bits = np.zeros((self.y2 - self.y1, self.x2 - self.x1), np.float32)
+        part = mask.bits[y1 - mask.y : y2 - mask.y, x1 - mask.x : x2 - mask.x]
+        bits[y1 - self.y1 : y2 - self.y1, x1 - self.x1 : x2 - self.x1] = part
         if self.step == 1:
             return bits
         return np.asarray(cv2.resize(bits, self.shape[::-1], interpolation=cv2.INTER_AREA), np.float32)
