@@ -154,7 +154,9 @@ def dense(
         back = cv2.remap(back, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # on the current picture
         off = there + back
         valid &= off[..., 0] ** 2 + off[..., 1] ** 2 < astray**2
-    return Flow(np.where(valid[..., None], -there, np.float32(0)), valid)
+    vectors = np.negative(there)
+    vectors[~valid] = 0
+    return Flow(vectors, valid)
 
 
 def global_motion(previous: Grey, current: Grey, exclude: Bits | None = None) -> Float:
@@ -294,8 +296,12 @@ def _robust(begin: Float, end: Float) -> tuple[Float, Bits]:
 
 def _off(affine: Float, begin: Float, end: Float) -> Float:
     """Distances (..., N) in pixels of points from where affine maps (..., 2, 3) take them."""
-    moved = begin @ affine[..., :2].swapaxes(-1, -2) + affine[..., None, :, 2] - end  # (..., N, 2)
-    return np.asarray(np.hypot(moved[..., 0], moved[..., 1]), np.float64)
+    (x, y), goals = begin.T, end.T
+    squared: Any = 0.0
+    for axis in (0, 1):
+        across, down, shift = (affine[..., axis, column, None] for column in range(3))  # (..., 1) each
+        squared = squared + (across * x + down * y + (shift - goals[axis])) ** 2
+    return np.asarray(np.sqrt(squared), np.float64)
 
 
 def _affine(begin: Float, end: Float, weights: Float) -> Float:
