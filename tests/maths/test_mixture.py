@@ -92,7 +92,7 @@ def test_what_components_answer_for_is_what_the_twin_says(seed, components, dime
     results = []
     for function in (expect, expect_twin):
         sums = np.zeros((components + 1, 1 + dimensions + dimensions * (dimensions + 1) // 2))
-        room = np.full((components + 2 + dimensions, BLOCK), np.nan)
+        room = np.full((components + 3 + dimensions, BLOCK), np.nan)
         results.append([function(points, weights, *forms, room, sums), sums])
     np.testing.assert_allclose(results[0][0], results[1][0], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(results[0][1], results[1][1], rtol=1e-9, atol=1e-9)

@@ -317,7 +317,7 @@ def _improve(mixture: Mixture, points: Float, counts: Float, iterations: int, se
     for _ in range(iterations):
         heights, factors = _forms(mixture)
         sums = np.zeros((len(mixture), 1 + dimensions + len(lower[0])))
-        room = np.empty((len(mixture) + 1 + dimensions, BLOCK))
+        room = np.empty((len(mixture) + 2 + dimensions, BLOCK))
         likelihood = expect(points, counts, heights, mixture.means, factors, room, sums) / total
         if likelihood - before < settled:
             break

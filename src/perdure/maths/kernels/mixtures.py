@@ -252,13 +252,13 @@ def expect(
         As in `_terms`; K ≥ 1, all finite.
     weights : (N,) float64
         How often each point counts.
-    room : (K + 1 + D, BLOCK) float64, changed
+    room : (K + 2 + D, BLOCK) float64, changed
         Scratch.
     sums : (K, 1 + D + D (D + 1) / 2) float64, changed
         Zeros before. Of the responsibilities r: Σ r, Σ r u, Σ r u uᵀ (lower triangle by rows), where u = point - mean.
     """
     dimensions, components, likelihood = points.shape[1], heights.shape[0], 0.0
-    best, block = room[components], room[components + 1 :]
+    best, away, block = room[components], room[components + 1], room[components + 2 :]
     for begin in range(0, points.shape[0], BLOCK):
         count = min(BLOCK, points.shape[0] - begin)
         for i in range(count):
@@ -272,26 +272,35 @@ def expect(
             for i in range(count):
                 best[i] = row[i] if row[i] > best[i] else best[i]
         for i in range(count):
-            top, total = best[i], 0.0
+            total = 0.0
             for k in range(components):
-                off = room[k, i] - top
+                off = room[k, i] - best[i]
                 share = np.exp(off) if off > NOTHING else 0.0
                 room[k, i] = share
                 total += share
-            likelihood += weights[begin + i] * (top + np.log(total))
-            scale = weights[begin + i] / total
-            for k in range(components):
-                share = room[k, i] * scale
-                if share == 0.0:
-                    continue
-                sums[k, 0] += share
-                place = 1 + dimensions
-                for d in range(dimensions):
-                    along = share * (points[begin + i, d] - means[k, d])
-                    sums[k, 1 + d] += along
-                    for e in range(d + 1):
-                        sums[k, place] += along * (points[begin + i, e] - means[k, e])
-                        place += 1
+            weight = weights[begin + i]
+            likelihood += weight * (best[i] + np.log(total))
+            best[i] = weight / total
+        for k in range(components):
+            row, sum_of = room[k], sums[k]
+            for i in range(count):
+                row[i] *= best[i]
+            for i in range(count):
+                sum_of[0] += row[i]
+            place = 1 + dimensions
+            for d in range(dimensions):
+                one, mean, along = block[d], means[k, d], 0.0
+                for i in range(count):
+                    away[i] = row[i] * (one[i] - mean)
+                for i in range(count):
+                    along += away[i]
+                sum_of[1 + d] += along
+                for e in range(d + 1):
+                    other, mean_of, across = block[e], means[k, e], 0.0
+                    for i in range(count):
+                        across += away[i] * (other[i] - mean_of)
+                    sum_of[place] += across
+                    place += 1
     return likelihood
 
 
