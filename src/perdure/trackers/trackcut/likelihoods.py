@@ -25,17 +25,18 @@ def learn_colours(
     start: Colours | None = None,
 ) -> Colours:
     """Return mixtures of the colours (h, w, 3) inside an object and near it, outside (eq. 6)."""
-    own, other = colours[inside], colours[near & ~inside]
     return Colours(
-        _fitted(own, components, start.own if start else None),
-        _fitted(other, components, start.other if start else None),
+        _fitted(colours, inside, components, start.own if start else None),
+        _fitted(colours, near & ~inside, components, start.other if start else None),
     )
 
 
-def _fitted(points: Float, components: int, start: Mixture | None) -> Mixture:
-    if not len(points):
+def _fitted(colours: Float, where: NDArray[np.bool_], components: int, start: Mixture | None) -> Mixture:
+    places = subsample(np.flatnonzero(where), _SAMPLE)
+    if not len(places):
         return start if start is not None else Mixture.empty(3)
-    return fit(subsample(points, _SAMPLE), components, start=start, iterations=_STEPS, floor=_FLOOR)
+    points = colours.reshape(-1, 3)[places]
+    return fit(points, components, start=start, iterations=_STEPS, floor=_FLOOR)
 
 
 def of_colours(points: Float, first: Colours, last: Colours, trust: float, bound: float) -> Float:
