@@ -35,6 +35,7 @@ _ASTRAY = 1.0  # pixels by which there and back may differ
 _CORNERS, _QUALITY = 400, 0.005  # of global motion: how many at most, and of what share of the best one's contrast
 _FEWEST = 8  # corners that must agree before a motion of the camera is believed
 _SAMPLES = 200  # of three corners: with half of them astray, one in eight is good
+_FIRST = 16  # of these are measured first
 _STILL = 0.1  # pixels: a camera that seems to move less stands still
 _SMALLEST = 12  # pixels a side: less has no room for patches and pyramids
 _STIFF = 9.0  # pixels²: how much corners must spread before anything but a translation is believed
@@ -281,7 +282,10 @@ def _robust(begin: Float, end: Float) -> tuple[Float, Bits]:
         0, len(begin), (_SAMPLES, 3)
     )  # its own generator, the same each time
     tried = np.concatenate([_affine(begin[triples], end[triples], np.ones((_SAMPLES, 3))), np.eye(2, 3)[None]])
-    medians = np.median(_off(tried, begin, end), axis=1)  # (S,)
+    off = _off(tried, begin, end)  # (S, N)
+    good = np.median(off[:_FIRST], axis=1).min()  # who has a smaller median has half of the points within it
+    tried, off = (each[np.count_nonzero(off <= good, axis=1) >= len(begin) // 2] for each in (tried, off))
+    medians = np.median(off, axis=1)
     found, spread = tried[int(medians.argmin())], float(medians.min())
     for _ in range(10):
         scale = max(4.685 * 1.4826 * spread / np.sqrt(2), 0.5)  # of Tukey's biweight, in pixels
