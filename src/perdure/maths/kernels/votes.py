@@ -31,7 +31,7 @@ def bins_of(colours: Bytes, bins: Ints) -> None:
     for y in range(bins.shape[0]):
         for x in range(bins.shape[1]):
             first, second, third = colours[y, x, 0] >> SHIFT, colours[y, x, 1] >> SHIFT, colours[y, x, 2] >> SHIFT
-            bins[y, x] = _FIRST + first * _PLANE + second * _ACROSS + third
+            bins[y, x] = _FIRST + np.int64(first) * _PLANE + np.int64(second) * _ACROSS + np.int64(third)
 
 
 @kernel_for(
