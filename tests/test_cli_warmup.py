@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from perdure.cli.progress import COMPILING, watched
-from perdure.maths.kernels import ahead
+from perdure.maths.kernels import ahead, kept
 
 PERDURE = [sys.executable, "-c", "from perdure.cli import main; main()"]
 
@@ -29,6 +30,33 @@ def test_warmup_makes_every_kernel_ready_and_says_where_they_are_kept():
     again = warmup()
     assert f"all {len(told['kernels'])} kernels were there already" in again.stdout
     assert place in again.stdout
+
+
+TWO = """
+from perdure.maths.kernels import ahead
+ahead.os.cpu_count, every, ahead.SLOWEST = lambda: 2, ahead.declared(), "counts.sharing"
+ahead.declared = lambda: {name: every[name] for name in ("counts.sharing", "counts.uncontested")}
+for one in ahead.ready():
+    print(one.name, one.compiled, bool(every[one.name].stats.cache_hits), one.place is not None)
+"""
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_the_slowest_kernel_is_compiled_by_a_second_process_or_where_it_cannot_keep_it_here(
+    tmp_path: Path, writable: bool
+):
+    folder = tmp_path / "kept"
+    if not writable:
+        for taken in (folder, tmp_path / f"perdure-{kept._user()}"):
+            taken.write_text("no folder")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder), "TMPDIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", TWO], capture_output=True, text=True, env=environment, timeout=120
+    )
+    assert done.stdout.splitlines() == [
+        f"counts.uncontested True False {writable}",
+        f"counts.sharing True {writable} {writable}",
+    ], done.stderr
 
 
 def test_help_loads_no_compiler():

@@ -18,12 +18,13 @@ import perdure
 from perdure import fold
 from perdure.detect import DETECTORS
 from perdure.maths.kernels import ahead, kept
-from perdure.maths.kernels.compile import changed, given, kernel, kernel_for
+from perdure.maths.kernels.compile import changed, given, kernel_for
 from perdure.trackers import TRACKERS
 from perdure.types import Regions
 
 ONE = (
-    "import numpy as np; from perdure.maths.kernels.overlaps import shares as f; b = np.eye(4, dtype=np.float32); "
+    "import numpy as np; from perdure.maths.kernels.overlaps import _shares as kernel, shares as f; "
+    "b = np.eye(4, dtype=np.float32); "
 )
 
 
@@ -42,7 +43,7 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 def compiled_anew() -> bool:
     """Call `grown` as another process would; whether it had to be compiled."""
-    made = kernel(grown)
+    made = kernel_for(int)(grown)
     assert made(1) == 2
     return bool(made.stats.cache_misses)
 
@@ -186,7 +187,7 @@ def python(code: str, installed: Path, **settings: str) -> subprocess.Popen[str]
 def test_without_a_home_and_beside_a_read_only_package_kernels_are_kept_among_temporary_files(
     installed: Path, tmp_path: Path
 ):
-    code = ONE + "print(f(b, b).shape, bool(f.stats.cache_misses), f.stats.cache_path)"
+    code = ONE + "print(f(b, b).shape, bool(kernel.stats.cache_misses), kernel.stats.cache_path)"
     for miss in (True, False):
         out, err = python(code, installed, TMPDIR=str(tmp_path)).communicate()
         assert out.startswith(f"(4, 4) {miss} {tmp_path}"), err
@@ -208,5 +209,7 @@ def test_two_processes_may_compile_at_once(installed: Path, tmp_path: Path):
     assert len({one.communicate() for one in running}) == 1
     (folder,) = tmp_path.iterdir()
     assert {path.suffix for path in folder.iterdir()} == {kept.ENDING}
-    again = python(ONE + "f(b, b); print(bool(f.stats.cache_misses))", installed, NUMBA_CACHE_DIR=str(tmp_path))
+    again = python(
+        ONE + "f(b, b); print(bool(kernel.stats.cache_misses))", installed, NUMBA_CACHE_DIR=str(tmp_path)
+    )
     assert again.communicate() == ("False\n", "")

@@ -13,18 +13,6 @@ SWEEPS = 4
 Float = NDArray[np.float32]
 
 
-@kernel_for(
-    given(np.uint8, 2, "C"),
-    given(np.float32, 3, "C"),
-    given(np.float32, 4, "C"),
-    given(np.int64, 2),
-    given(np.int64, 2),
-    given(np.int64, 2),
-    float,
-    float,
-    float,
-    changed(np.float64),
-)
 def arrange(
     support: NDArray[np.uint8],
     picture: Float,
@@ -61,8 +49,40 @@ def arrange(
     gains : (N,) float64, changed
         What every form gained when it last was moved, per cell, less what its way cost.
     """
-    placed = corners.copy()
-    covered = np.zeros(support.shape, np.float32)
+    placed, covered = corners.copy(), np.zeros(support.shape, np.float32)
+    _arrange(support, picture, forms, extents, corners, reach, pull, colour, contrast, gains, placed, covered)
+    return placed
+
+
+@kernel_for(
+    given(np.uint8, 2, "C"),
+    given(np.float32, 3, "C"),
+    given(np.float32, 4, "C"),
+    given(np.int64, 2),
+    given(np.int64, 2),
+    given(np.int64, 2),
+    float,
+    float,
+    float,
+    changed(np.float64),
+    changed(np.int64, 2),
+    changed(np.float32, 2),
+)
+def _arrange(
+    support: NDArray[np.uint8],
+    picture: Float,
+    forms: Float,
+    extents: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    reach: NDArray[np.int64],
+    pull: float,
+    colour: float,
+    contrast: float,
+    gains: NDArray[np.float64],
+    placed: NDArray[np.int64],
+    covered: Float,
+) -> None:
+    """Move what is `placed`; `covered` (0 before) adds up the shares of the forms at each place."""
     for n in range(len(placed)):
         _stamp(covered, forms, extents, placed, n, 1.0)
     for _sweep in range(SWEEPS):
@@ -83,7 +103,6 @@ def arrange(
             _stamp(covered, forms, extents, placed, n, 1.0)
         if not moved:
             break
-    return placed
 
 
 def arrange_twin(
@@ -187,13 +206,14 @@ def _gain(
                 continue
             if support[y, x] == 2:
                 continue
-            free = max(0.0, 1.0 - covered[y, x])
+            free = 1.0 - covered[y, x] if covered[y, x] < 1.0 else 0.0
             worth = free
             if coloured:
                 red = picture[y, x, 0] - forms[n, a, b, 0]
                 green = picture[y, x, 1] - forms[n, a, b, 1]
                 blue = picture[y, x, 2] - forms[n, a, b, 2]
-                match = 1.0 - 2.0 * min(1.0, (red * red + green * green + blue * blue) / (contrast * contrast))
+                unlike = (red * red + green * green + blue * blue) / (contrast * contrast)
+                match = 1.0 - 2.0 * (unlike if unlike < 1.0 else 1.0)
                 worth += colour * (match if match > 0 else match * free)
             gain += share * worth
     return gain / total if total > 0 else 0.0

@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import given, kernel, kernel_for
+from perdure.maths.kernels.compile import changed, given, kernel, kernel_for
 
 
-@kernel_for(given(np.uint16, 2, "C"), given(np.int64), float, float, float, float)
 def basins(
     relief: NDArray[np.uint16],
     order: NDArray[np.int64],
@@ -38,15 +37,61 @@ def basins(
         and both have at least so many pixels when they meet.
     """
     height, width = relief.shape
-    heights, labels = relief.reshape(-1), np.zeros(height * width, np.int32)
-    parent = np.zeros(order.shape[0], np.int32)
-    peak, area = np.zeros(order.shape[0], np.float64), np.zeros(order.shape[0], np.float64)
+    labels = np.zeros(relief.size, np.int32)
+    parent, peaks = np.zeros(len(order), np.int32), np.zeros((2, len(order)))
+    heights = np.ascontiguousarray(relief).reshape(-1)
+    _basins(
+        heights,
+        height,
+        width,
+        order,
+        neck,
+        least_peak,
+        least_share,
+        least_area,
+        labels,
+        parent,
+        peaks[0],
+        peaks[1],
+    )
+    return labels.reshape(relief.shape)
+
+
+@kernel_for(
+    given(np.uint16, 1, "C"),
+    int,
+    int,
+    given(np.int64),
+    float,
+    float,
+    float,
+    float,
+    changed(np.int32),
+    changed(np.int32),
+    changed(np.float64),
+    changed(np.float64),
+)
+def _basins(
+    heights: NDArray[np.uint16],
+    height: int,
+    width: int,
+    order: NDArray[np.int64],
+    neck: float,
+    least_peak: float,
+    least_share: float,
+    least_area: float,
+    labels: NDArray[np.int32],
+    parent: NDArray[np.int32],
+    peak: NDArray[np.float64],
+    area: NDArray[np.float64],
+) -> None:
+    """Write labels; `parent`, `peak` and `area` are of the basins. All are 0 before."""
     count = 0
     for place in order:
         y, x = place // width, place % width
         mine = -1
-        for other_y in range(max(0, y - 1), min(height, y + 2)):
-            for other_x in range(max(0, x - 1), min(width, x + 2)):
+        for other_y in range(y - 1 if y > 0 else 0, y + 2 if y + 2 < height else height):
+            for other_x in range(x - 1 if x > 0 else 0, x + 2 if x + 2 < width else width):
                 label = labels[other_y * width + other_x]
                 if label == 0:
                     continue
@@ -55,7 +100,9 @@ def basins(
                     mine = other
                 elif other != mine:
                     high, low = (mine, other) if peak[mine] >= peak[other] else (other, mine)
-                    small, large = min(area[high], area[low]), max(area[high], area[low])
+                    small, large = area[high], area[low]
+                    if small > large:
+                        small, large = large, small
                     apart = heights[place] < neck * peak[low] and peak[low] >= least_peak * peak[high]
                     if not (apart and small >= least_share * large and small >= least_area):
                         parent[low] = high
@@ -68,7 +115,6 @@ def basins(
         area[mine] += 1
     for place in order:
         labels[place] = _root(parent, labels[place] - 1) + 1
-    return labels.reshape(height, width)
 
 
 @kernel

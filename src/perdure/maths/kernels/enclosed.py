@@ -13,7 +13,6 @@ ALL_BUT_BELOW = BESIDE | ABOVE
 PARTLY = 254  # what is enclosed, but not on all four sides
 
 
-@kernel_for(changed(np.uint8, 2), changed(np.uint8, 2))
 def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
     """Turn doubtful pixels that sure ones enclose into sure ones, in place: 255 if on all four sides, else PARTLY.
 
@@ -28,8 +27,13 @@ def enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8]) -> None:
     reach : (H, W) uint8, changed
         Workspace.
     """
+    _enclosed(seen, reach, np.zeros(len(seen), np.bool_))
+
+
+@kernel_for(changed(np.uint8, 2), changed(np.uint8, 2), changed(np.bool_))
+def _enclosed(seen: NDArray[np.uint8], reach: NDArray[np.uint8], doubtful: NDArray[np.bool_]) -> None:
+    """Note in `doubtful` which rows have something to decide; most have nothing."""
     height, width = seen.shape
-    doubtful = np.zeros(height, np.bool_)  # rows; most have nothing to decide
     for y in range(height):
         open_left, open_right, some = False, False, False
         for x in range(width):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import given, kernel_for
+from perdure.maths.kernels.compile import changed, given, kernel_for
 
 Float = NDArray[np.float32]
 Followed = tuple[Float, NDArray[np.int8], Float]
@@ -16,13 +16,12 @@ POINTS = (
     (-0.5, 0.0),
     (0.5, 0.0),
 )  # centre, top, bottom, left, right, in sizes
-_SIDES = (3, 1, 4, 2)  # points of the left, top, right and bottom side, as the bits of what is hidden
-_OPPOSITE = (4, 2, 3, 1)
+_OFFSETS = np.array(POINTS)
+_SIDES = np.array([3, 1, 4, 2])  # points of the left, top, right and bottom side, as the bits of what is hidden
+_OPPOSITE = np.array([4, 2, 3, 1])
+_ERROR, _PLACE, _SIZE, _OLD, _WAS = range(5)  # rows of scratch
 
 
-@kernel_for(
-    given(np.float32, 2), given(np.float32, 2), given(np.bool_), given(np.float32), given(np.float32), float
-)
 def follow(
     expected: Float, boxes: Float, entering: NDArray[np.bool_], pace: Float, picture: Float, partial: float
 ) -> Followed:
@@ -53,77 +52,103 @@ def follow(
         widths and heights, ≥ 1.
     """
     count = len(boxes)
-    points = np.empty((count, 5, 2), np.float32)
-    hidden = np.zeros(count, np.int8)
+    points, hidden = np.empty((count, 5, 2), np.float32), np.zeros(count, np.int8)
     mean = np.empty((count, 2), np.float32)
-    error, good = np.empty(5), np.empty(5, np.bool_)
-    place, size, old, was = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
-    for k in range(count):
+    _follow(expected, boxes, entering, pace, picture, partial, np.empty((5, 5)), points, hidden, mean)
+    return points, hidden, mean
+
+
+@kernel_for(
+    given(np.float32, 2),
+    given(np.float32, 2),
+    given(np.bool_),
+    given(np.float32),
+    given(np.float32),
+    float,
+    changed(np.float64, 2),
+    changed(np.float32, 3),
+    changed(np.int8),
+    changed(np.float32, 2),
+)
+def _follow(
+    expected: Float,
+    boxes: Float,
+    entering: NDArray[np.bool_],
+    pace: Float,
+    picture: Float,
+    partial: float,
+    room: NDArray[np.float64],
+    points: Float,
+    hidden: NDArray[np.int8],
+    mean: Float,
+) -> None:
+    """Write points, hidden sides (0 before) and mean sizes; (5, 5) `room` is scratch."""
+    for k in range(len(boxes)):
         for axis in range(2):
-            old[axis] = max(expected[k, axis + 2] - expected[k, axis], 1.0)
-            was[axis] = (expected[k, axis + 2] + expected[k, axis]) / 2
-            size[axis] = max(boxes[k, axis + 2] - boxes[k, axis], 0.0)
-            place[axis] = (boxes[k, axis + 2] + boxes[k, axis]) / 2
+            usual, seen = expected[k, axis + 2] - expected[k, axis], boxes[k, axis + 2] - boxes[k, axis]
+            room[_OLD, axis] = usual if usual > 1.0 else 1.0
+            room[_WAS, axis] = (expected[k, axis + 2] + expected[k, axis]) / 2
+            room[_SIZE, axis] = seen if seen > 0.0 else 0.0
+            room[_PLACE, axis] = (boxes[k, axis + 2] + boxes[k, axis]) / 2
         best = np.inf
         for p in range(5):
-            across = (place[0] + POINTS[p][0] * size[0] - was[0] - POINTS[p][0] * old[0]) / old[0]
-            down = (place[1] + POINTS[p][1] * size[1] - was[1] - POINTS[p][1] * old[1]) / old[1]
-            error[p] = np.sqrt(across * across + down * down)
-            best = min(best, error[p])
-        limit = max(partial, best + partial / 2)
-        x, y, number = 0.0, 0.0, 0
-        for p in range(5):
-            good[p] = error[p] <= limit
-            if good[p]:
-                x += place[0] + POINTS[p][0] * (size[0] - old[0])
-                y += place[1] + POINTS[p][1] * (size[1] - old[1])
-                number += 1
-        x, y = x / number, y / number
-        points[k, 0, 0], points[k, 0, 1] = x, y
-        for p in range(1, 5):
-            if good[p]:
-                points[k, p, 0] = place[0] + POINTS[p][0] * size[0]
-                points[k, p, 1] = place[1] + POINTS[p][1] * size[1]
-            else:
-                points[k, p, 0] = x + POINTS[p][0] * old[0]
-                points[k, p, 1] = y + POINTS[p][1] * old[1]
+            squared = 0.0
+            for axis in range(2):
+                from_place = room[_PLACE, axis] + _OFFSETS[p, axis] * room[_SIZE, axis]
+                away = (from_place - room[_WAS, axis] - _OFFSETS[p, axis] * room[_OLD, axis]) / room[_OLD, axis]
+                squared += away * away
+            room[_ERROR, p] = np.sqrt(squared)
+            best = room[_ERROR, p] if room[_ERROR, p] < best else best
+        limit = best + partial / 2
+        limit = partial if partial > limit else limit
+        for axis in range(2):
+            centre, number = 0.0, 0
+            for p in range(5):
+                if room[_ERROR, p] <= limit:
+                    centre += room[_PLACE, axis] + _OFFSETS[p, axis] * (room[_SIZE, axis] - room[_OLD, axis])
+                    number += 1
+            centre = centre / number
+            points[k, 0, axis] = centre
+            for p in range(1, 5):
+                seen = room[_PLACE, axis] + _OFFSETS[p, axis] * room[_SIZE, axis]
+                implied = centre + _OFFSETS[p, axis] * room[_OLD, axis]
+                points[k, p, axis] = seen if room[_ERROR, p] <= limit else implied
         for side in range(4):
-            short = size[side % 2] < (1 - partial) * old[side % 2]
-            if short and not good[_SIDES[side]] and good[_OPPOSITE[side]]:
+            short = room[_SIZE, side & 1] < (1 - partial) * room[_OLD, side & 1]
+            if short and room[_ERROR, _SIDES[side]] > limit and room[_ERROR, _OPPOSITE[side]] <= limit:
                 hidden[k] |= 1 << side
         for axis in range(2):
+            size, old = room[_SIZE, axis], room[_OLD, axis]
             cut = boxes[k, axis] <= 1 or boxes[k, axis + 2] >= picture[axis] - 1
-            grows = size[axis] > old[axis]
+            grows = size > old
             step = float(pace[k])
             if grows and (cut or entering[k]):
                 step = 1.0
             elif (
-                abs(size[axis] - old[axis]) > partial * old[axis]
-                and abs(place[axis] - was[axis]) > partial / 2 * old[axis]
+                abs(size - old) > partial * old and abs(room[_PLACE, axis] - room[_WAS, axis]) > partial / 2 * old
             ):
                 step = step / 2 if grows else step / 8
-            mean[k, axis] = max(old[axis] + step * (size[axis] - old[axis]), 1.0)
-    return points, hidden, mean
+            size = old + step * (size - old)
+            mean[k, axis] = size if size > 1.0 else 1.0
 
 
 def follow_twin(
     expected: Float, boxes: Float, entering: NDArray[np.bool_], pace: Float, picture: Float, partial: float
 ) -> Followed:
     """Do the same with whole columns: the oracle of `follow`."""
-    offsets = np.array(POINTS)
     ends, starts = boxes.astype(np.float64), expected.astype(np.float64)
     old, was = np.maximum(starts[:, 2:] - starts[:, :2], 1.0), (starts[:, 2:] + starts[:, :2]) / 2
     size, place = np.maximum(ends[:, 2:] - ends[:, :2], 0.0), (ends[:, 2:] + ends[:, :2]) / 2
-    seen = place[:, None] + offsets * size[:, None]  # (K, 5, 2)
-    away = (seen - was[:, None] - offsets * old[:, None]) / old[:, None]
+    seen = place[:, None] + _OFFSETS * size[:, None]  # (K, 5, 2)
+    away = (seen - was[:, None] - _OFFSETS * old[:, None]) / old[:, None]
     error = np.sqrt((away**2).sum(axis=2))  # (K, 5)
     good = error <= np.maximum(partial, error.min(axis=1, initial=np.inf) + partial / 2)[:, None]
-    implied = seen - offsets * old[:, None]  # (K, 5, 2) centres
+    implied = seen - _OFFSETS * old[:, None]  # (K, 5, 2) centres
     centre = (implied * good[..., None]).sum(axis=1) / good.sum(axis=1)[:, None]  # (K, 2)
-    points = np.where(good[..., None], seen, centre[:, None] + offsets * old[:, None])
+    points = np.where(good[..., None], seen, centre[:, None] + _OFFSETS * old[:, None])
     points[:, 0] = centre
     short = np.tile(size < (1 - partial) * old, 2)  # (K, 4) left, top, right, bottom
-    bits = (short & ~good[:, list(_SIDES)] & good[:, list(_OPPOSITE)]) * (1 << np.arange(4))
+    bits = (short & ~good[:, _SIDES] & good[:, _OPPOSITE]) * (1 << np.arange(4))
     cut = (ends[:, :2] <= 1) | (ends[:, 2:] >= picture - 1)
     grows = size > old
     step = np.broadcast_to(pace.astype(np.float64)[:, None], size.shape)

@@ -75,7 +75,7 @@ _KINDS = (np.int32, np.int32, np.int32, np.uint8, np.uint16, np.int32, np.int32,
 _GRAPH = types.NamedTuple([changed(kind) for kind in _KINDS], Graph)
 
 
-@kernel_for(_GRAPH, int, counted=False)
+@kernel_for(_GRAPH, int)
 def solve(graph: Graph, pixels: Int) -> Int:
     """Push all the flow there is; return how much. After it the S forest, key > 0, is the minimal source set.
 

@@ -48,14 +48,11 @@ class Kept(NullCache):
     def load_overload(self, types: Any, target: Any) -> Any:
         """Return the form for these types; None where there is none that is whole and of this very source."""
         target.refresh()
-        name = self._name(types, target.codegen())
-        for place in searched():
-            with contextlib.suppress(Exception):  # whatever is wrong with a file, compiling anew mends it
-                held = (place / name).read_bytes()
-                if held[:_DIGEST] == self._digest(name, held[_DIGEST:]):
-                    form = CompileResult._rebuild(target, *pickle.loads(held[_DIGEST:]))
-                    self.place = place
-                    return form
+        for place, code in self._whole(types, target.codegen()):
+            with contextlib.suppress(Exception):  # whatever is wrong with it, compiling anew mends it
+                form = CompileResult._rebuild(target, *pickle.loads(code))
+                self.place = place
+                return form
         LOG.info("compiling %s", self._function.__qualname__)
         return None
 
@@ -71,6 +68,18 @@ class Kept(NullCache):
                 self.place = place
                 return
         _say_that_nothing_is_kept()
+
+    def has(self, types: Any, codegen: Any) -> bool:
+        """Whether there is a form for these types that is whole and of this very source."""
+        return next(self._whole(types, codegen), None) is not None
+
+    def _whole(self, types: Any, codegen: Any) -> Iterator[tuple[Path, bytes]]:
+        name = self._name(types, codegen)
+        for place in searched():
+            with contextlib.suppress(OSError):
+                held = (place / name).read_bytes()
+                if held[:_DIGEST] == self._digest(name, held[_DIGEST:]):
+                    yield place, held[_DIGEST:]
 
     def _name(self, types: Any, codegen: Any) -> str:
         """One for each function, set of types, processor, Python and Numba; newer source takes the place of older.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.kernels.compile import given, kernel, kernel_for
+from perdure.maths.kernels.compile import changed, given, kernel, kernel_for
 
 Float = NDArray[np.float32]
 Index = NDArray[np.int64]
@@ -13,26 +13,30 @@ Nearby = tuple[Index, Index, Float, NDArray[np.bool_]]
 _SPECK = 1e-6  # no side and no area is smaller, where they divide
 
 
-@kernel_for(given(np.float32, 2), given(np.float32, 2))
 def distances(one: Float, other: Float) -> Float:
     """Return the distances (N, M) of boxes (N, 4) from others (M, 4), in [0, inf).
 
     1 - IoU where they overlap, else 1 + distance of the centres / the longest side of both.
     """
-    found, full, half = np.empty((len(one), len(other)), np.float32), np.float32(1), np.float32(2)
-    for n in range(len(one)):
-        for m in range(len(other)):
-            both = _shared(one[n], other[m])
-            if both > 0:
-                found[n, m] = full - both / (_area(one[n]) + _area(other[m]) - both)
-                continue
-            x = (one[n, 0] + one[n, 2]) / half - (other[m, 0] + other[m, 2]) / half
-            y = (one[n, 1] + one[n, 3]) / half - (other[m, 1] + other[m, 3]) / half
-            found[n, m] = np.sqrt(x * x + y * y) / max(_longest(one[n]), _longest(other[m])) + full
+    found = np.empty((len(one), len(other)), np.float32)
+    _distances(one, other, found)
     return found
 
 
-@kernel_for(given(np.float32, 2), given(np.float32, 2), float, float)
+@kernel_for(given(np.float32, 2), given(np.float32, 2), changed(np.float32, 2))
+def _distances(one: Float, other: Float, found: Float) -> None:
+    full, half = np.float32(1), np.float32(2)
+    for n in range(len(one)):
+        for m in range(len(other)):
+            both = _shared(one, n, other, m)
+            if both > 0:
+                found[n, m] = full - both / (_area(one, n) + _area(other, m) - both)
+                continue
+            x = (one[n, 0] + one[n, 2]) / half - (other[m, 0] + other[m, 2]) / half
+            y = (one[n, 1] + one[n, 3]) / half - (other[m, 1] + other[m, 3]) / half
+            found[n, m] = np.sqrt(x * x + y * y) / _larger(_longest(one, n), _longest(other, m)) + full
+
+
 def nearby(one: Float, other: Float, farthest: float, size_ratio: float) -> Nearby:
     """Return the pairs of boxes whose 1 - IoU is below `farthest`; boxes that do not touch are no pair.
 
@@ -50,54 +54,103 @@ def nearby(one: Float, other: Float, farthest: float, size_ratio: float) -> Near
     (K,) int, (K,) int, (K,) float32, (K,) bool
         Row in `one`, row in `other`, 1 - IoU, whether both are of similar size; in the order of the rows.
     """
-    limit, ratio, least, full = np.float32(farthest), np.float32(size_ratio), np.float32(_SPECK), np.float32(1)
-    space = np.empty(len(other), np.float32)
+    space, room = np.empty(len(other), np.float32), 4 * max(len(one), len(other))
+    while True:
+        rows, columns = np.empty(room, np.int64), np.empty(room, np.int64)
+        apart, alike = np.empty(room, np.float32), np.empty(room, np.bool_)
+        count = _nearby(
+            one, other, np.float32(farthest), np.float32(size_ratio), space, rows, columns, apart, alike
+        )
+        if count <= room:
+            return rows[:count], columns[:count], apart[:count], alike[:count]
+        room = count
+
+
+@kernel_for(
+    given(np.float32, 2),
+    given(np.float32, 2),
+    np.float32,
+    np.float32,
+    changed(np.float32),
+    changed(np.int64),
+    changed(np.int64),
+    changed(np.float32),
+    changed(np.bool_),
+)
+def _nearby(
+    one: Float,
+    other: Float,
+    limit: np.float32,
+    ratio: np.float32,
+    space: Float,
+    rows: Index,
+    columns: Index,
+    apart: Float,
+    alike: NDArray[np.bool_],
+) -> int:
+    """Write as many pairs as there is room for; return how many there are."""
+    least, full, count = np.float32(_SPECK), np.float32(1), 0
     for m in range(len(other)):
-        space[m] = _area(other[m])
-    rows, columns = [0 for _ in range(0)], [0 for _ in range(0)]
-    distances, alike = [full for _ in range(0)], [True for _ in range(0)]
+        space[m] = _area(other, m)
     for n in range(len(one)):
-        left, right, mine = one[n, 0], one[n, 2], _area(one[n])
+        left, right, mine = one[n, 0], one[n, 2], _area(one, n)
         for m in range(len(other)):
-            if min(right, other[m, 2]) <= max(left, other[m, 0]):  # most are beside each other
+            if _smaller(right, other[m, 2]) <= _larger(left, other[m, 0]):  # most are beside each other
                 continue
-            both = _shared(one[n], other[m])
+            both = _shared(one, n, other, m)
             if both > 0:
                 distance = full - both / (mine + space[m] - both)
                 if distance < limit:
-                    rows.append(n)
-                    columns.append(m)
-                    distances.append(distance)
-                    alike.append(max(mine, space[m]) <= ratio * max(min(mine, space[m]), least))
-    return np.array(rows), np.array(columns), np.array(distances), np.array(alike)
+                    if count < len(rows):
+                        rows[count], columns[count], apart[count] = n, m, distance
+                        small = _larger(_smaller(mine, space[m]), least)
+                        alike[count] = _larger(mine, space[m]) <= ratio * small
+                    count += 1
+    return count
 
 
-@kernel_for(given(np.float32, 2), given(np.float32, 2))
 def shares(one: Float, other: Float) -> Float:
     """Return what share (N, M), in [0, 1], of each of some boxes (N, 4) lies in each of others (M, 4)."""
-    found, least = np.empty((len(one), len(other)), np.float32), np.float32(_SPECK)
-    for n in range(len(one)):
-        whole = max(_area(one[n]), least)
-        for m in range(len(other)):
-            found[n, m] = _shared(one[n], other[m]) / whole
+    found = np.empty((len(one), len(other)), np.float32)
+    _shares(one, other, found)
     return found
 
 
+@kernel_for(given(np.float32, 2), given(np.float32, 2), changed(np.float32, 2))
+def _shares(one: Float, other: Float, found: Float) -> None:
+    for n in range(len(one)):
+        whole = _larger(_area(one, n), np.float32(_SPECK))
+        for m in range(len(other)):
+            found[n, m] = _shared(one, n, other, m) / whole
+
+
 @kernel
-def _shared(one: Float, other: Float) -> np.float32:
+def _shared(one: Float, n: int, other: Float, m: int) -> np.float32:
     """Return the area that two boxes share."""
-    across, down = min(one[2], other[2]) - max(one[0], other[0]), min(one[3], other[3]) - max(one[1], other[1])
+    across = _smaller(one[n, 2], other[m, 2]) - _larger(one[n, 0], other[m, 0])
+    down = _smaller(one[n, 3], other[m, 3]) - _larger(one[n, 1], other[m, 1])
     return np.float32(across * down) if across > 0 and down > 0 else np.float32(0)
 
 
 @kernel
-def _area(box: Float) -> np.float32:
-    return np.float32(max(box[2] - box[0], np.float32(0)) * max(box[3] - box[1], np.float32(0)))
+def _area(boxes: Float, n: int) -> np.float32:
+    nothing = np.float32(0)
+    return _larger(boxes[n, 2] - boxes[n, 0], nothing) * _larger(boxes[n, 3] - boxes[n, 1], nothing)
 
 
 @kernel
-def _longest(box: Float) -> np.float32:
-    return np.float32(max(box[2] - box[0], box[3] - box[1], np.float32(_SPECK)))
+def _longest(boxes: Float, n: int) -> np.float32:
+    return _larger(_larger(boxes[n, 2] - boxes[n, 0], boxes[n, 3] - boxes[n, 1]), np.float32(_SPECK))
+
+
+@kernel
+def _larger(one: np.float32, other: np.float32) -> np.float32:
+    return one if one >= other else other
+
+
+@kernel
+def _smaller(one: np.float32, other: np.float32) -> np.float32:
+    return one if one <= other else other
 
 
 def distances_twin(one: Float, other: Float) -> Float:

@@ -74,7 +74,6 @@ def extend(
         last[row, 0], last[row, 1], last[row, 2] = time, points[place, 0], points[place, 1]
 
 
-@kernel_for(given(np.float64, 3), given(np.float64, 2), given(np.float64, 2), given(np.float64), float, float)
 def motion(knots: Float, last: Float, sums: Float, tolerance: Float, shortest: float, horizon: float) -> Float:
     """Return motion vectors (N, 2), px/s: of the last segment if it is reliable, else of more of them.
 
@@ -88,12 +87,28 @@ def motion(knots: Float, last: Float, sums: Float, tolerance: Float, shortest: f
         Seconds that a reliable segment must have lasted, and that an unreliable path looks back.
     """
     vectors = np.zeros((len(last), 2))
+    _motion(knots, last, sums, tolerance, shortest, horizon, vectors)
+    return vectors
+
+
+@kernel_for(
+    given(np.float64, 3),
+    given(np.float64, 2),
+    given(np.float64, 2),
+    given(np.float64),
+    float,
+    float,
+    changed(np.float64, 2),
+)
+def _motion(
+    knots: Float, last: Float, sums: Float, tolerance: Float, shortest: float, horizon: float, vectors: Float
+) -> None:
     for row in range(len(last)):
         tt, number = sums[row, TT], sums[row, N]
         across = sums[row, TX] / tt if tt > 0 else 0.0
         down = sums[row, TY] / tt if tt > 0 else 0.0
-        left = max(sums[row, RR] - across * sums[row, TX] - down * sums[row, TY], 0.0)
-        misfit = np.sqrt(left / number) if number > 0 else 0.0
+        left = sums[row, RR] - across * sums[row, TX] - down * sums[row, TY]
+        misfit = np.sqrt(left / number) if number > 0 and left > 0 else 0.0
         lasted = last[row, 0] - knots[row, -1, 0]
         if lasted >= shortest - 1e-9 and number >= 2 and misfit <= tolerance[row] / 2:
             vectors[row, 0], vectors[row, 1] = across, down
@@ -107,7 +122,6 @@ def motion(knots: Float, last: Float, sums: Float, tolerance: Float, shortest: f
         if since > 0:
             vectors[row, 0] = (last[row, 1] - knots[row, far, 1]) / since
             vectors[row, 1] = (last[row, 2] - knots[row, far, 2]) / since
-    return vectors
 
 
 def extend_twin(
