@@ -15,14 +15,6 @@ Ints = NDArray[np.int32]
 MOST = 2**29 - 1  # an arc holds up to twice its capacity, an excess what is added to it later
 
 
-@kernel_for(
-    given(np.float64, 2, "C"),
-    given(np.float64, 3, "C"),
-    float,
-    changed(np.int32),
-    changed(np.int32),
-    int,
-)
 def fill(
     unary: Float, pairwise: Float, scale: float, residual: Ints, excess: Ints, width: int
 ) -> tuple[int, bool]:
@@ -39,33 +31,64 @@ def fill(
     width : int
         Pixels from a row of the grid to the next.
     """
+    below, wrong = _fill(
+        unary, pairwise, scale, residual, excess, width, np.zeros(8 * (unary.shape[1] + 2), np.int32)
+    )
+    return below, wrong == 0
+
+
+@kernel_for(
+    given(np.float64, 2, "C"),
+    given(np.float64, 3, "C"),
+    float,
+    changed(np.int32),
+    changed(np.int32),
+    int,
+    changed(np.int32),
+)
+def _fill(
+    unary: Float, pairwise: Float, scale: float, residual: Ints, excess: Ints, width: int, room: Ints
+) -> tuple[int, int]:
+    """Return how many do not fit; `room` is scratch for the capacities of two rows, (8 * (W + 2),), 0 before.
+
+    A row's weights are rounded in loops that become vector code, and a pixel's eight capacities written together.
+    """
     height, wide = unary.shape
-    below, good = 0, True
+    below: Any = 0
+    wrong, step = 0, wide + 2
     for y in range(height):
-        row = (y + 1) * width + 1
+        row, here, before = (y + 1) * width + 1, (y & 1) * 4 * step + 1, (1 - (y & 1)) * 4 * step + 1
         for x in range(wide):
             value = unary[y, x] * scale
             fits = abs(value) <= MOST
-            good = good and fits
-            whole = int(np.floor(value + 0.5)) if fits else 0
-            below += min(whole, 0)
+            wrong += 0 if fits else 1
+            whole = np.int32(np.floor(value + 0.5)) if fits else np.int32(0)
+            below += whole if whole < 0 else 0
             excess[row + x] = -whole
         for d in range(pairwise.shape[0]):
+            last = d > 0 and y == height - 1
             begin = 1 if d == 3 else 0
             end = wide - 1 if d == 0 or d == 2 else wide
-            if d > 0 and y == height - 1:
+            if last:
+                for x in range(wide):
+                    room[here + d * step + x] = 0
                 continue
-            across = 1 if d == 0 or d == 2 else (0 if d == 1 else -1)
-            back = (across + (0 if d == 0 else width)) * 8 + 1
             for x in range(begin, end):
                 value = pairwise[d, y, x] * scale
-                fits = value >= 0.0 and value <= MOST
-                good = good and fits
-                capacity = np.int32(value + 0.5) if fits else np.int32(0)
-                place = (row + x) * 8 + 2 * d
-                residual[place] = capacity
-                residual[place + back] = capacity
-    return below, good
+                fits = (value >= 0.0) & (value <= MOST)
+                wrong += 0 if fits else 1
+                room[here + d * step + x] = np.int32(value + 0.5) if fits else np.int32(0)
+        for x in range(wide):
+            place = (row + x) * 8
+            residual[place] = room[here + x]
+            residual[place + 1] = room[here + x - 1]
+            residual[place + 2] = room[here + step + x]
+            residual[place + 3] = room[before + step + x]
+            residual[place + 4] = room[here + 2 * step + x]
+            residual[place + 5] = room[before + 2 * step + x - 1]
+            residual[place + 6] = room[here + 3 * step + x]
+            residual[place + 7] = room[before + 3 * step + x + 1]
+    return below, wrong
 
 
 @kernel_for(given(np.bool_, 2, "C"), changed(np.int32), changed(np.int32), int)

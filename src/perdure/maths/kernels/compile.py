@@ -11,10 +11,11 @@ import numba
 import numba._dynfunc
 import numpy as np
 from numba import types
+from numba.core import ir
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, _LowerResult
-from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.typed_passes import NativeLowering, NopythonTypeInference
 from numba.extending import intrinsic
 
 from perdure.maths.kernels.kept import Kept
@@ -36,7 +37,8 @@ def kernel_for(*declared: Any) -> Callable[[F], F]:
     """Compile a kernel at its first call, for the types declared: what converts to them is taken, nothing else.
 
     One set of types is one compilation, known before anything runs: `perdure warmup` makes them all, and no later
-    call has to wait for another. A kernel makes no arrays: its caller does, which needs nothing compiled.
+    call has to wait for another. A kernel makes no arrays: its caller does, which needs nothing compiled. A place in
+    a flat array must not be below 0, unless it is a constant.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def part(function: F) -> F:
 
 
 def _compiled(function: Any) -> Any:
-    made: Any = numba.njit(**_OPTIONS)(function)
+    made: Any = numba.njit(**_OPTIONS, pipeline_class=_Compiler)(function)
     if hasattr(made, "compile"):  # NUMBA_DISABLE_JIT leaves the function as it is
         made._cache = Kept(function)  # what cache=True sets to Numba's own
     return made
@@ -136,6 +138,39 @@ def _lowest(typing: Any, bits: Any) -> Any:
 lowest: Any = intrinsic(_lowest)
 
 
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _PlacesFromZero(FunctionPass):
+    """Ask of no place in a flat array whether it is below 0, to be counted from the end.
+
+    Where a kernel goes from place to place that is a seventh of its time, and loops with it become no vector code.
+    """
+
+    _name = "places_from_zero"
+
+    def __init__(self) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+
+    def run_pass(self, state: Any) -> bool:
+        for block in state.func_ir.blocks.values():
+            for statement in block.body:
+                where = statement if isinstance(statement, ir.SetItem) else getattr(statement, "value", None)
+                if where is statement or (isinstance(where, ir.Expr) and where.op == "getitem"):
+                    signature = state.calltypes[where]
+                    array, place, *rest = signature.args
+                    if isinstance(array, types.Array) and isinstance(place, types.Integer):
+                        del state.calltypes[where]  # none is ever replaced
+                        state.calltypes[where] = signature.replace(args=(array, types.uintp, *rest))
+        return True
+
+
+class _Compiler(CompilerBase):
+    def define_pipelines(self) -> list[Any]:
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state, "kernel")
+        passes.add_pass_after(_PlacesFromZero, NopythonTypeInference)
+        passes.finalize()
+        return [passes]
+
+
 # Numba turns every function into machine code of its own, and what calls it takes it in and optimises it once more.
 # Nobody else calls what only kernels call: it is written down, and becomes machine code as part of a kernel.
 
@@ -167,9 +202,9 @@ class _Writing(NativeLowering):
         return True
 
 
-class _Writer(CompilerBase):
+class _Writer(_Compiler):
     def define_pipelines(self) -> list[Any]:
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state, "written")
+        (passes,) = super().define_pipelines()
         passes.passes = [(_Writing if one is NativeLowering else one, why) for one, why in passes.passes]
         passes.finalize()
         return [passes]

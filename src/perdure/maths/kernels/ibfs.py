@@ -31,7 +31,6 @@ Ints = NDArray[np.int32]
 Int = Any  # a Python int or one of NumPy's: to Numba they are the same
 
 int64 = np.int64
-at = np.uint64  # a place in an array that is not below 0: Numba does not ask
 S, T = int64(0), int64(1)  # the sides
 ROOT, LINK, NONE, DEAD = 8, 9, 10, 11  # how a node hangs; below 8: by its arc in that direction
 CODE, FOREST, LINKED, LISTED = 15, 16, 64, 128  # bits of a mark; FOREST << side: is in that side's queue
@@ -113,12 +112,12 @@ def _swept(graph: Graph, pixels: Int) -> Int:
     for back in range(2):
         for place in range(pixels):
             v = pixels - 1 - place if back else place
-            left = int64(excess[at(v)])
+            left = int64(excess[v])
             j = back
             while left > 0 and j < 8:
                 u = v + turn[OFFSETS + j]
-                before = int64(excess[at(u)])
-                flow = min(left, int64(residual[at(v * 8 + j)]), MOST - before)
+                before = int64(excess[u])
+                flow = min(left, int64(residual[v * 8 + j]), MOST - before)
                 if flow > 0:
                     residual[v * 8 + j] -= flow
                     residual[u * 8 + (j ^ 1)] += flow
@@ -138,19 +137,19 @@ def _plant(graph: Graph, pixels: Int) -> Int:
     for v in range(pixels):
         way: Int = int64(0)
         for j in range(8):
-            way |= int64(residual[at(v * 8 + j)] > 0) << j
+            way |= int64(residual[v * 8 + j] > 0) << j
         low[v] = way
     for v in range(row + 1, pixels - row - 1):
         graph.open[v] = (
             low[v]
-            | ((low[at(v + 1)] >> 1 & 1) << 8)
-            | ((low[at(v - 1)] & 1) << 9)
-            | ((low[at(v + row)] >> 3 & 1) << 10)
-            | ((low[at(v - row)] >> 2 & 1) << 11)
-            | ((low[at(v + row + 1)] >> 5 & 1) << 12)
-            | ((low[at(v - row - 1)] >> 4 & 1) << 13)
-            | ((low[at(v + row - 1)] >> 7 & 1) << 14)
-            | ((low[at(v - row + 1)] >> 6 & 1) << 15)
+            | ((low[v + 1] >> 1 & 1) << 8)
+            | ((low[v - 1] & 1) << 9)
+            | ((low[v + row] >> 3 & 1) << 10)
+            | ((low[v - row] >> 2 & 1) << 11)
+            | ((low[v + row + 1] >> 5 & 1) << 12)
+            | ((low[v - row - 1] >> 4 & 1) << 13)
+            | ((low[v + row - 1] >> 7 & 1) << 14)
+            | ((low[v - row + 1] >> 6 & 1) << 15)
         )
     sinks = 0
     for v in range(key.shape[0]):
@@ -283,7 +282,7 @@ def _grown(graph: Graph, v: Int, side: Int, level: Int, pixels: Int) -> Int:
         return int64(0)
     free, other = int64(0), int64(0)
     for j in range(8):
-        found = key[at(v + graph.turn[OFFSETS + j])] * sign
+        found = key[v + graph.turn[OFFSETS + j]] * sign
         free |= int64(found == 0) << j
         other |= int64(found < 0) << j
     way = int64(graph.open[v]) >> (8 * side)
@@ -486,7 +485,7 @@ def _adopted(graph: Graph, v: Int, side: Int, pixels: Int) -> Int:
     if v < pixels:
         some = int64(0)
         for j in range(8):
-            some |= int64(key[at(v + graph.turn[OFFSETS + j])] == wanted) << j
+            some |= int64(key[v + graph.turn[OFFSETS + j]] == wanted) << j
         some &= int64(graph.open[v]) >> (8 * (1 - side))
         while some != 0:
             j = lowest(some)
@@ -548,7 +547,7 @@ def _detached(graph: Graph, side: Int, root: Int, pixels: Int) -> Int:
         if v < pixels:
             some = int64(0)
             for j in range(8):
-                some |= int64(key[at(v + graph.turn[OFFSETS + j])] == after) << j
+                some |= int64(key[v + graph.turn[OFFSETS + j]] == after) << j
             while some != 0:
                 j = lowest(some)
                 some &= some - 1
@@ -620,7 +619,7 @@ def _offered(graph: Graph, v: Int, side: Int, level: Int, end: Int, pixels: Int)
     if v < pixels:
         some = int64(0)
         for j in range(8):
-            found = key[at(v + graph.turn[OFFSETS + j])] * sign
+            found = key[v + graph.turn[OFFSETS + j]] * sign
             some |= int64((found == 0) | (found > FAR + level)) << j
         some &= (int64(graph.open[v]) >> (8 * side)) & 255
         while some != 0:
@@ -653,7 +652,7 @@ def _nearest(graph: Graph, v: Int, side: Int, least: Int, pixels: Int) -> Int:
     if v < pixels:
         way = int64(graph.open[v]) >> (8 * (1 - side))
         for j in range(8):
-            level = int64(key[at(v + graph.turn[OFFSETS + j])] * sign)
+            level = int64(key[v + graph.turn[OFFSETS + j]] * sign)
             good = ((way >> j) & 1) != 0 and level > 0 and level < FAR
             best = min(best, level * 8 + j if good else int64(NEVER))
         if best < NEVER:
