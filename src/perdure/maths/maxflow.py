@@ -348,27 +348,35 @@ class Workspace:
     def _join(self, nodes: Nodes, width: int) -> None:
         """Write the links, and which pixels have any."""
         from perdure.maths.kernels import capacities
-        from perdure.maths.kernels.ibfs import LINKED
 
         graph, count = self._graph, len(nodes.pixels)
         pixel, node, first, _, _, bits, ranks, begins, ways, _ = self._tables
         if self._marked:
             graph.mark[:] = 0
             self._marked = False
-        first[:] = count
         first[0] = 0
         first[1 : len(nodes.ends) + 1] = nodes.ends
+        first[len(nodes.ends) + 1 :] = count
         if not count:
             return
-        weights = _wholes(nodes.weights, self._scale, "nodes.weights", signed=False)
-        place = self._pixels * 8
-        graph.residual[place : place + 2 * count : 2] = weights
-        graph.residual[place + 1 : place + 2 * count : 2] = weights
-        pixel[:count] = nodes.pixels
-        node[:count] = self._pixels + np.repeat(np.arange(len(nodes.ends)), np.diff(nodes.ends, prepend=0))
-        capacities.join(pixel[:count], width + 1, width, bits.view(np.uint32), ranks, begins, ways)
-        graph.mark[pixel[:count]] = LINKED
+        places, ends = np.asarray(nodes.pixels, np.int64), np.asarray(nodes.ends, np.int64)
+        weights, tables = np.asarray(nodes.weights, np.float64), (bits.view(np.uint32), ranks, begins, ways)
         self._marked = True
+        if capacities.join(
+            places,
+            ends,
+            weights,
+            self._scale,
+            self._pixels,
+            width + 1,
+            width,
+            graph.residual,
+            graph.mark,
+            pixel,
+            node,
+            *tables,
+        ):
+            _wholes(weights, self._scale, "nodes.weights", signed=False)
 
     def _forbid_links(self, nodes: Nodes, domain: Bits) -> None:
         """Close the links to pixels outside the domain."""
@@ -422,6 +430,8 @@ def _wholes(weights: Float, scale: float, name: str, *, signed: bool) -> NDArray
     from perdure.maths.kernels.capacities import MOST
 
     weights = np.asarray(weights, np.float64)
+    if not weights.size:
+        return np.zeros(0, np.int64)
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = weights * scale
         wrong = ~(np.abs(scaled) <= MOST) if signed else ~((scaled >= 0) & (scaled <= MOST))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths.kernels.compile import changed, given, kernel_for
+from perdure.maths.kernels.ibfs import LINKED
 
 Float = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -150,31 +151,76 @@ def shift(
 
 
 @kernel_for(
-    changed(np.int32), int, int, changed(np.uint32), changed(np.int32), changed(np.int32), changed(np.int32)
+    given(np.int64),
+    given(np.int64),
+    given(np.float64),
+    float,
+    int,
+    int,
+    int,
+    changed(np.int32),
+    changed(np.uint8),
+    changed(np.int32),
+    changed(np.int32),
+    changed(np.uint32),
+    changed(np.int32),
+    changed(np.int32),
+    changed(np.int32),
 )
 def join(
-    pixels: Ints, width: int, wide: int, bits: NDArray[np.uint32], ranks: Ints, begins: Ints, ways: Ints
+    places: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    weights: Float,
+    scale: float,
+    first: int,
+    width: int,
+    wide: int,
+    residual: Ints,
+    mark: NDArray[np.uint8],
+    pixels: Ints,
+    nodes: Ints,
+    bits: NDArray[np.uint32],
+    ranks: Ints,
+    begins: Ints,
+    ways: Ints,
 ) -> int:
-    """Order links by their pixels; return how many pixels have any.
+    """Write the links of nodes, and order them by their pixels; return how many weights do not fit.
 
     Parameters
     ----------
-    pixels : (L,) int32, changed
-        From flat places in a picture `wide` pixels wide to places in the grid.
+    places, ends, weights : (L,), (K,), (L,)
+        As in `maxflow.Nodes`.
+    scale : float
+        Capacities a unit of weight.
+    first : int
+        The first node: how many pixels there are.
     width, wide : int
         Pixels from a row of the grid to the next, and in a row of the picture.
+    residual, mark : (≥ P * 8 + 2 * L,), (≥ P,), changed
+        Capacities of the links, there and back; which pixels have any: LINKED.
+    pixels, nodes : (≥ L,) int32, changed
+        The ends of each link.
     bits, ranks : (P / 32,), changed
         Which pixels have links, and how many before.
     begins, ways : (≥ L + 1,), (≥ L,), changed
         Where each such pixel's links begin in `ways`, and the links in this order.
     """
-    count = len(pixels)
+    count, node, wrong = len(places), 0, 0
     for word in range(len(bits)):
         bits[word] = 0
     for link in range(count):
-        place = pixels[link]
-        pixel = (place // wide + 1) * width + 1 + place % wide
+        while link >= ends[node]:
+            node += 1
+        pixel: Any = (places[link] // wide + 1) * width + 1 + places[link] % wide
+        value = weights[link] * scale
+        fits = value >= 0.0 and value <= MOST
+        wrong += 0 if fits else 1
+        capacity = np.int32(value + 0.5) if fits else np.int32(0)
+        residual[first * 8 + 2 * link] = capacity
+        residual[first * 8 + 2 * link + 1] = capacity
         pixels[link] = pixel
+        nodes[link] = first + node
+        mark[pixel] = LINKED
         bits[pixel >> 5] |= np.uint32(1) << np.uint32(pixel & 31)
     linked = 0
     for word in range(len(bits)):
@@ -183,13 +229,13 @@ def join(
         while left != 0:
             left &= left - np.uint32(1)
             linked += 1
-    for place in range(linked + 1):
-        begins[place] = 0
+    for rank in range(linked + 1):
+        begins[rank] = 0
     for turn in range(2):  # first how many links each pixel has, then which
         for link in range(count):
             pixel = pixels[link]
             left = bits[pixel >> 5] & ((np.uint32(1) << np.uint32(pixel & 31)) - np.uint32(1))
-            place = np.int64(ranks[pixel >> 5])
+            place: Any = np.int64(ranks[pixel >> 5])
             while left != 0:
                 left &= left - np.uint32(1)
                 place += 1
@@ -199,6 +245,6 @@ def join(
                 begins[place] -= 1
                 ways[begins[place]] = link
         if turn == 0:
-            for place in range(1, linked + 1):
-                begins[place] += begins[place - 1]
-    return linked
+            for rank in range(1, linked + 1):
+                begins[rank] += begins[rank - 1]
+    return wrong
