@@ -11,7 +11,7 @@ from perdure.maths.maxflow import STEPS
 Float = NDArray[np.float32]
 
 
-@kernel_for(given(np.float32, 3, "C"), changed(np.float32, 3), counted=False)
+@kernel_for(given(np.float32, 3, "C"), changed(np.float32, 3))
 def squared_differences(colours: Float, out: Float) -> float:
     """Write the squared distance of each pixel's colour from its neighbours'; return the sum of all.
 

@@ -30,7 +30,6 @@ FLAT = 1e-12  # squared slope below which nothing is curved
     given(np.int64, 1, "C"),
     changed(np.float64, 2),
     changed(np.int64, 2),
-    counted=False,
 )
 def pieces(phi: Float, pixels: Index, ends: Float, edges: Index) -> int:
     """Write the pieces of the contour in the cells of 2x2 pixels whose upper left ones are named; return their number.
@@ -111,7 +110,6 @@ def _place(phi: Float, key: int, row: int, column: int, ends: Float, edges: Inde
     float,
     changed(np.int64),
     int,
-    counted=False,
 )
 def measure(phi: Float, held: Float, ends: Float, band: float, pixels: Index, count: int) -> int:
     """Write distances from the pieces of a contour in its band; return how many pixels that has.
@@ -196,7 +194,6 @@ def _settled(held: Float, y: int, x: int, distance: float) -> float:
     given(np.bool_, 2, "C"),
     float,
     changed(np.float64),
-    counted=False,
 )
 def rates(phi: Float, pixels: Index, force: Float, domain: Bits, curvature: float, out: Float) -> float:
     """Write by how much pixels change in a unit of time; return the greatest speed, px per unit.
@@ -268,14 +265,14 @@ def _lesser(one: float, other: float) -> float:
     return one if abs(one) < abs(other) else other
 
 
-@kernel_for(given(np.float64, 2, "C"), given(np.float64, 2, "C"), changed(np.float64), counted=False)
+@kernel_for(given(np.float64, 2, "C"), given(np.float64, 2, "C"), changed(np.float64))
 def sample(field: Float, points: Float, out: Float) -> None:
     """Write the values (N,) of a picture (H, W) at points (N, 2) x, y between pixels; beyond it those of its border."""
     for n in range(len(points)):
         out[n] = _value(field, points[n, 0], points[n, 1])
 
 
-@kernel_for(given(np.float64, 2, "C"), given(np.float64, 2, "C"), float, changed(np.float64, 2), counted=False)
+@kernel_for(given(np.float64, 2, "C"), given(np.float64, 2, "C"), float, changed(np.float64, 2))
 def carry(phi: Float, back: Float, scale: float, out: Float) -> None:
     """Write the distances (h, w) of a shape that has moved.
 

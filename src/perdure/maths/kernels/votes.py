@@ -25,7 +25,7 @@ _FIRST, BINS = _PLANE + _ACROSS + 1, (LEVELS + 2) ** 3
 _AGAINST = 1 << 16  # a bin has votes for in its lower half; near a place are at most 9 CELL² of either kind
 
 
-@kernel_for(given(np.uint8, 3, "C"), changed(np.int32, 2), counted=False)
+@kernel_for(given(np.uint8, 3, "C"), changed(np.int32, 2))
 def bins_of(colours: Bytes, bins: Ints) -> None:
     """Write the bin of each pixel (H, W) of colours (H, W, 3)."""
     for y in range(bins.shape[0]):
@@ -42,7 +42,6 @@ def bins_of(colours: Bytes, bins: Ints) -> None:
     changed(np.int32, 2),
     changed(np.float32),
     changed(np.float32, 2),
-    counted=False,
 )
 def weigh(
     before: Ints, own: NDArray[np.bool_], asked: Ints, bound: np.float32, room: Ints, said: Float, out: Float
