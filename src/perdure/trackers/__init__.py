@@ -5,9 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from perdure.trackers.compound import Compound, CompoundState
+from perdure.trackers.contour import Contour, ContourState
 from perdure.trackers.overlap import Overlap
 from perdure.trackers.trackcut import TrackCut, TrackCutState
 
-__all__ = ["TRACKERS", "Compound", "CompoundState", "Overlap", "TrackCut", "TrackCutState"]
+__all__ = [
+    "TRACKERS",
+    "Compound",
+    "CompoundState",
+    "Contour",
+    "ContourState",
+    "Overlap",
+    "TrackCut",
+    "TrackCutState",
+]
 
-TRACKERS: dict[str, type[Any]] = {"compound": Compound, "overlap": Overlap, "trackcut": TrackCut}
+TRACKERS: dict[str, type[Any]] = {  # of those that follow marks, the first is taken where none is named
+    "compound": Compound,
+    "overlap": Overlap,
+    "trackcut": TrackCut,
+    "contour": Contour,
+}

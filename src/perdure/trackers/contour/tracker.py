@@ -1,0 +1,513 @@
+"""The tracker: predict, measure, update, learn, say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.features.masks import disjoint, mask_overlaps, mask_shares
+from perdure.maths import lie
+from perdure.maths.mixture import log_density
+from perdure.params import parameter
+from perdure.trackers.contour import observer
+from perdure.trackers.contour.measuring import Measured, measured, of_evidence
+from perdure.trackers.contour.observer import Gains, State
+from perdure.trackers.contour.saying import gone, happenings, has_left, rows_of
+from perdure.trackers.contour.seeing import (
+    Weights,
+    Window,
+    evidence,
+    fitted,
+    lab_of,
+    learnt_layer,
+    learnt_place,
+    moved_on,
+    small_grey,
+    velocity_by_flow,
+    window_round,
+)
+from perdure.trackers.contour.targets import Looks, Place, Target
+from perdure.types import Bits, Event, Frame, Mask, Regions, Report, Scene
+
+Float = NDArray[np.float64]
+Single = NDArray[np.float32]
+_HIDDEN = 0.15  # share of a silhouette that is seen, below which nothing is
+_FROZEN = 0.6  # below which nothing is learnt of its shape and looks
+_STEADY = 0.08  # rate at which the velocity for hidden times follows
+_WHOLE = 0.9  # below which it is only shifted: no turn or growth is believed
+_MORE, _LESS = 0.2, 0.015  # rates at which the usual support follows what is seen, where that is more, or less
+_FAR, _BETTER = 0.1, 0.05  # what the farthest shift must gain more, and any, of 2 between all wrong and all right
+_COVERED, _SAME = 0.2, 0.3
+_MARKED = 0.5
+_SMOOTH = 3  # cells across which evidence is averaged
+_EDGE = 0.8  # |f_in - f_out| averaged over the reach, from which there is no edge within it
+_TELLING = 0.35  # share seen from which flow tells how the whole moves
+_NEAR_EDGE = 0.45  # the same where flow tells how it moves
+_RATE = 0.25  # at which an object's own picture is brought up to date
+_PLACE_RATE = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class ContourState:
+    """All objects, and the place."""
+
+    targets: tuple[Target, ...]
+    waiting: tuple[Mask, ...]
+    place: Place
+    light: NDArray[np.uint8]  # (H, W) grey of the frame before; (0, 0) before the first
+    next_key: int
+    next_id: int
+    time: float
+    size: tuple[int, int]  # height, width
+
+
+class _Seen(NamedTuple):
+    """What a frame shows of one object."""
+
+    window: Window
+    colours: Single
+    evidence: Single  # (h, w)
+    state: State  # with the motion that the flow shows
+    edge: float  # |f_in - f_out| averaged over the reach, from which an edge is not the contour's
+    pose: Float  # where it should be
+    depth: Float  # (h, w) cells, signed distances of the silhouette there
+    known: Bits
+
+
+@dataclass(frozen=True)
+class Contour:
+    """The contour observer: a shape that deforms slowly, and the motion of a group, corrected by what each frame shows."""
+
+    shape_gain: float = parameter(0.8, "how much of a measured shape is believed", low=0.0, high=1.0, symbol="L_μ")
+    motion_gain: float = parameter(
+        0.6, "how much of a measured motion is believed", low=0.0, high=1.0, symbol="L_v"
+    )
+    gains: str = parameter(
+        "automatic", "gains as they are, or by the share that is seen", choices=("automatic", "constant")
+    )
+    group: str = parameter("se2", "motions of the whole", choices=tuple(lie.GROUPS))
+    motion: str = parameter(
+        "velocity", "what stays constant while nothing is seen", choices=tuple(observer.MOTIONS)
+    )
+    window: int = parameter(4, "frames whose motions are corrected", low=1, high=50, symbol="k")
+    iterations: int = parameter(10, "steps down each gradient, a frame", low=1, high=1000)
+    reach: int = parameter(8, "how far from the contour an edge is looked for", unit="cells", low=1, high=100)
+    giving: float = parameter(0.3, "how fast a shape gives up pixels, beside taking them in", low=0.0, high=1.0)
+    search: float = parameter(
+        16.0, "how far from where it is expected an object is looked for", unit="px", low=1.0, high=500.0
+    )
+    curvature: float = parameter(0.02, "weight of the contour's length", unit="cells", low=0.0, high=10.0)
+    components: int = parameter(5, "Gaussians of a mixture of colours", low=1, high=50)
+    trust: float = parameter(0.5, "trust in the colours seen at first against those seen last", low=0.0, high=1.0)
+    place: float = parameter(0.5, "trust in colours at their places against colours anywhere", low=0.0, high=1.0)
+    bound: float = parameter(4.0, "largest evidence for a pixel", unit="nats", low=0.1, high=60.0)
+    ring: float = parameter(40.0, "how far round an object it is looked for", unit="px", low=4.0, high=2000.0)
+    cells: int = parameter(40000, "cells in which an object is looked at, at most", low=1000, high=10**7)
+    patience: float = parameter(
+        2.0, "how long an object that is hidden is looked for", unit="s", low=0.0, high=3600.0
+    )
+    smallest: float = parameter(
+        0.0004, "area of the smallest object that an observation founds", unit="of the picture", low=0.0, high=1.0
+    )
+    flow: bool = parameter(True, "whether what is seen of an object tells by its flow how it moves")
+    moved: Callable[[Float], Float] | None = field(default=None, repr=False)  # the user's own motion model
+    reserved: int = field(default=0, repr=False)  # ids up to it are those of marks, also of later ones
+
+    needs_pixels = True
+    follows_marks = True
+
+    def start(self, scene: Scene) -> ContourState:
+        """Return the state without an object."""
+        none = Place(np.zeros((0, 0, 3), np.uint8), np.zeros((0, 0), np.bool_), np.zeros((0, 0), np.uint8), 1)
+        return ContourState((), (), none, none.grey, 1, self.reserved + 1, 0.0, (scene.height, scene.width))
+
+    def step(self, state: ContourState, frame: Frame, regions: Regions) -> tuple[ContourState, Report]:
+        """Predict, measure and update every object, learn, find new ones, say."""
+        if frame.image is None:
+            return replace(state, time=frame.time), Report()
+        lab = lab_of(frame.image)
+        grey, step = small_grey(frame.image)
+        place = Place(lab, np.zeros(lab.shape[:2], np.bool_), grey, step)
+        if state.place.grey.shape == grey.shape:
+            place, _ = moved_on(state.place, grey, step, self._things(state.targets, state.size))
+        light = np.asarray(cv2.cvtColor(np.ascontiguousarray(frame.image), cv2.COLOR_RGB2GRAY), np.uint8)
+        sights = [self._look(*self._moved(one, state.light, light), lab, place) for one in state.targets]
+        waited = frame.time - state.time
+        targets = self._updated(state.targets, sights, waited)
+        targets, born, waiting, events = self._born(state, targets, frame, lab, place, regions)
+        place = learnt_place(place, lab, self._things(targets, state.size), _PLACE_RATE)
+        kept, believed = [], []
+        for one in targets:
+            whole = self._silhouette(one)
+            left = has_left(whole.box, state.size) and one.missed > 0
+            if one.missed > self.patience + 1e-9 or left or not whole.area:
+                events.append(gone(one, frame, left))
+            else:
+                kept.append(one)
+                believed.append(whole)
+        rows = rows_of(kept, believed, frame, state.size, self.patience)
+        events += happenings(state.targets, kept, frame)
+        next_id = max([state.next_id, *(one.id + 1 for one in born)])
+        after = ContourState(
+            tuple(kept), waiting, place, light, state.next_key + len(born), next_id, frame.time, state.size
+        )
+        return after, Report(rows, events=tuple(events))
+
+    def finish(self, state: ContourState) -> Report:
+        """Return nothing: all has been said."""
+        return Report()
+
+    @property
+    def _group(self) -> lie.Group:
+        return lie.GROUPS[self.group]
+
+    @property
+    def _motion(self) -> Callable[[Float], Float]:
+        return self.moved or observer.MOTIONS[self.motion]
+
+    # Measuring ----------------------------------------------------------------------------------------------
+
+    def _look(self, target: Target, edge: float, lab: NDArray[np.uint8], place: Place) -> _Seen:
+        """Return what a frame shows round where an object is expected: first by colours anywhere, then at their places."""
+        weights = Weights(self.place, self.trust, self.bound)
+        size = (lab.shape[0], lab.shape[1])
+        pose = observer.predicted(target.state, self._group)
+        window = window_round(target.state.shape, pose, self.ring, self.cells)
+        colours = window.cut(lab).astype(np.float32)
+        inside = window.inside(size)
+        depth = window.drawn(target.state.shape, pose)
+        outside = depth > self.reach
+        plain = evidence(window, colours, target.looks, place, outside, None, weights)
+        one = self._measured(window, plain, inside)
+        if self.gains == "automatic":
+            pose = pose + self._shifted(target, one, depth)
+        state = observer.towards(target.state, pose, self._group)
+        if target.missed == 0 or _support(depth, one, self.reach) >= _HIDDEN * target.usual:
+            found = self._registered(state, one, edge, target.visible >= _WHOLE)
+            near = self.reach / 2 * window.step if target.visible < _WHOLE and not target.missed else np.inf
+            pose = found if np.abs(found[:2, 2] - pose[:2, 2]).max() <= near else pose
+            state = observer.towards(target.state, pose, self._group)
+        depth = window.drawn(target.state.shape, pose)
+        full = evidence(window, colours, target.looks, place, depth > self.reach, pose, weights)
+        smooth = np.asarray(cv2.blur(full, (_SMOOTH, _SMOOTH)), np.float32)
+        return _Seen(window, colours, smooth, state, edge, pose, depth, inside)
+
+    def _moved(self, target: Target, before: NDArray[np.uint8], now: NDArray[np.uint8]) -> tuple[Target, float]:
+        """Return an object with the velocity that what is seen of it has had, and how far from the contour edges are its own.
+
+        Where flow tells, only near ones are: others are those of what comes before it.
+        """
+        if target.missed > 0 or before.shape != now.shape or target.visible < _TELLING or not self.flow:
+            return target, _EDGE
+        pose = observer.pose_of(target.state, self._group)
+        found = velocity_by_flow(
+            before, now, target.seen, pose, target.state.velocity, self._group, whole=target.visible >= _WHOLE
+        )
+        if found is None:
+            return target, _EDGE
+        return replace(target, state=replace(target.state, velocity=found)), _NEAR_EDGE
+
+    def _measured(self, window: Window, found: Single, known: Bits) -> Measured:
+        return of_evidence(found, known, self.reach, window.x, window.y, window.step)
+
+    def _shifted(self, target: Target, one: Measured, depth: Float) -> Float:
+        """Return the shift (3, 3) to the place of least energy (3) near: the descent begins there.
+
+        E(d) = const + the sum of f_in - f_out over the silhouette; far shifts must gain more.
+        """
+        search = self.search * (1 if target.missed == 0 else 2)
+        most = max(1, int(search / one.step))
+        out = np.zeros((3, 3))
+        inside = depth < 0
+        rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+        if not len(rows):
+            return out
+        piece = inside[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.float32)
+        field = cv2.copyMakeBorder(one.pull, most, most, most, most, cv2.BORDER_CONSTANT, value=0)
+        field = field[rows[0] : rows[-1] + 1 + 2 * most, columns[0] : columns[-1] + 1 + 2 * most]
+        sums = cv2.matchTemplate(field, piece, cv2.TM_CCORR) / float(piece.sum())  # (2 most + 1, 2 most + 1)
+        y, x = np.mgrid[-most : most + 1, -most : most + 1]
+        sums = sums + _FAR * (x**2 + y**2) / most**2
+        best = np.unravel_index(int(np.argmin(np.round(sums, 4) + 1e-9 * (x**2 + y**2))), sums.shape)
+        gained = float(sums[most, most] - sums[best])
+        hidden = target.visible < _WHOLE and (sums[best] >= 0 or gained < 4 * _BETTER)
+        if hidden or gained < _BETTER:
+            return out
+        out[0, 2], out[1, 2] = float(x[best]) * one.step, float(y[best]) * one.step
+        return out
+
+    def _registered(self, state: State, one: Measured, edge: float, whole: bool) -> Float:
+        """Return the pose (3, 3) of the contour in this frame alone."""
+        gains = Gains(0.0, 1.0)
+        after = self._observed(
+            replace(
+                state, velocities=state.velocities[:0], measurements=(), base=observer.pose_of(state, self._group)
+            ),
+            one,
+            gains,
+            edge,
+            whole,
+        )
+        return observer.pose_of(after, self._group)
+
+    def _observed(self, state: State, one: Measured, gains: Gains, edge: float, whole: bool = True) -> State:
+        automatic = self.gains == "automatic"
+        return observer.updated(
+            state, one, gains, self._group,
+            window=self.window, steps=self.iterations, motion=self._motion, reach=self.reach,
+            curvature=self.curvature, robust=edge if automatic else 2.0,
+            force=(self._slower if whole else self._heard) if automatic else None, free=6 if whole or not automatic else 2,
+        )  # fmt: skip
+
+    def _heard(self, push: Float, shape: Float) -> Float:
+        """Return (5) of an object that is partly hidden: where nothing within reach looks like it, μ is rigid."""
+        own = ((push < -0.2) & (shape < self.reach)).astype(np.uint8)
+        side = 2 * self.reach + 1
+        near = cv2.dilate(own, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+        return np.where(np.asarray(near) > 0, self._slower(push, shape), 0.0)
+
+    def _slower(self, push: Float, shape: Float) -> Float:
+        """Return (5), weaker where μ gives up pixels: what is hidden looks as if it were no more."""
+        return np.where(push > 0, self.giving * push, push)
+
+    # Updating -----------------------------------------------------------------------------------------------
+
+    def _updated(self, targets: tuple[Target, ...], sights: list[_Seen], waited: float) -> list[Target]:
+        """Return the objects with shape, pose and looks brought up to date."""
+        found = []
+        for number, (target, sight) in enumerate(zip(targets, sights, strict=True)):
+            taken = self._taken(number, sights)
+            known = sight.known & ~taken
+            found.append(self._one_updated(target, sight, known, waited))
+        return found
+
+    def _taken(self, number: int, sights: list[_Seen]) -> Bits:
+        """Return which cells (h, w) look more like another object that should be there."""
+        own = sights[number]
+        taken = np.zeros(own.evidence.shape, np.bool_)
+        for other, sight in enumerate(sights):
+            if other == number:
+                continue
+            there = own.window.to_cells() @ lie.inverse(sight.window.to_cells())
+            claim = np.where(sight.depth < 0, sight.evidence, np.float32(-99))
+            size = (own.window.width, own.window.height)
+            moved = cv2.warpAffine(
+                claim, there[:2], size, flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=-99
+            )
+            taken |= (moved > 0) & ((own.depth >= 0) | (moved >= own.evidence))
+        return taken
+
+    def _one_updated(self, target: Target, sight: _Seen, known: Bits, waited: float) -> Target:
+        one = self._measured(sight.window, sight.evidence, known)
+        area = _support(sight.depth, one, self.reach)
+        visible = min(1.0, area / max(target.usual, 1.0))
+        state, group = sight.state, self._group
+        if self.gains == "automatic":
+            share = min(max((visible - _FROZEN) / (_WHOLE - _FROZEN), 0.0), 1.0)
+            gains = Gains(self.shape_gain * share, self.motion_gain * visible)
+        else:
+            share, gains = 1.0, Gains(self.shape_gain, self.motion_gain)
+        if visible < _HIDDEN and self.gains == "automatic":
+            blank = measured(np.zeros((1, 1)), 0)
+            state = observer.coasted(
+                observer.towards(target.state, observer.predicted(target.state, group), group),
+                blank,
+                group,
+                window=self.window,
+            )
+            state = self._steadied(state, target.steady, 0.0)
+            return replace(
+                target, state=state, seen=Mask.empty(), visible=visible, missed=target.missed + waited, links=()
+            )
+        state = self._observed(state, one, gains, sight.edge, visible >= _WHOLE)
+        steady = target.steady
+        if visible >= _WHOLE:
+            steady = steady + max(_STEADY, 1 / (target.frames + 1)) * (state.velocities[-1] - steady)
+        state = self._steadied(state, steady, share)
+        pose = observer.pose_of(state, group)
+        depth = sight.window.drawn(state.shape, pose)
+        seen = (depth < 0) & (one.pull < 0)
+        usual = target.usual + (_MORE if area > target.usual else _LESS) * (area - target.usual)
+        mask = self._mask(sight.window, seen)
+        looks = target.looks
+        if visible >= _FROZEN:
+            looks = self._learnt(looks, sight, depth, seen, pose)
+        return replace(
+            target,
+            state=state,
+            looks=looks,
+            seen=mask,
+            visible=visible,
+            usual=usual,
+            steady=steady,
+            missed=0.0,
+            frames=target.frames + 1,
+            links=(),
+        )
+
+    def _steadied(self, state: State, steady: Float, share: float) -> State:
+        """Return the state with a prediction that is the steadier, the less is seen; it turns and grows by half at most."""
+        if self.gains == "constant":
+            return state
+        velocity = share * state.velocity + (1 - share) * steady
+        velocity[2:] = share * state.velocity[2:] / 2
+        return replace(state, velocity=velocity)
+
+    def _learnt(self, looks: Looks, sight: _Seen, depth: Float, seen: Bits, pose: Float) -> Looks:
+        layer = learnt_layer(
+            looks.layer, sight.window, sight.colours, (depth < -1) & (sight.evidence > -1), pose, _RATE
+        )
+        return replace(
+            looks,
+            last_own=fitted(sight.colours[seen], self.components, looks.last_own),
+            last_other=fitted(sight.colours[depth > 2], self.components, looks.last_other),
+            layer=layer,
+        )
+
+    def _mask(self, window: Window, cells: Bits) -> Mask:
+        bits = cells
+        if window.step > 1:
+            size = (window.width * window.step, window.height * window.step)
+            bits = cv2.resize(cells.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5
+        return Mask.of_image(bits, window.y, window.x)
+
+    def _silhouette(self, target: Target) -> Mask:
+        """Return the whole silhouette: it may leave the picture."""
+        pose = observer.pose_of(target.state, self._group)
+        window = window_round(target.state.shape, pose, 3.0, 10**9)
+        return Mask.of_image(window.drawn(target.state.shape, pose) < 0, window.y, window.x)
+
+    def _things(self, targets: list[Target] | tuple[Target, ...], size: tuple[int, int]) -> Bits:
+        things = np.zeros(size, np.bool_)
+        for one in targets:
+            x1, y1, x2, y2 = self._silhouette(one).box
+            things[max(y1 - 6, 0) : max(y2 + 6, 0), max(x1 - 6, 0) : max(x2 + 6, 0)] = True
+        return things
+
+    # Births -------------------------------------------------------------------------------------------------
+
+    def _born(
+        self,
+        state: ContourState,
+        targets: list[Target],
+        frame: Frame,
+        lab: NDArray[np.uint8],
+        place: Place,
+        regions: Regions,
+    ) -> tuple[list[Target], list[Target], tuple[Mask, ...], list[Event]]:
+        """Found objects on regions that are nobody's, and on marks."""
+        marks = regions.data.get("mark")
+        if marks is None and regions.blind:
+            return targets, [], state.waiting, []
+        targets = list(targets)
+        masks = [_mask_of(regions, row, state.size) for row in range(len(regions))]
+        least = max(self.smallest * state.size[0] * state.size[1], 1)
+        born: list[Target] = []
+        waiting: list[Mask] = []
+        events: list[Event] = []
+        next_id = max([state.next_id, *(one.id + 1 for one in targets)])
+        held = [self._silhouette(one) for one in targets]
+        for number, mask in enumerate(masks):
+            identity = int(marks[number]) if marks is not None else 0
+            if not identity:
+                if mask_shares([mask], held).sum() >= _COVERED or mask.area < least:
+                    continue
+                if len(state.place.grey) and not (mask_shares([mask], state.waiting) > _SAME).any():
+                    waiting.append(mask)
+                    continue
+            elif mask.area < 1:
+                continue
+            lost = _marked_before(targets, held, mask, identity) if identity else None
+            if lost is not None:
+                was = targets[lost]
+                targets[lost] = self._newborn(mask, lab, place, regions, number, frame, was.key, identity)
+                if identity != was.id:
+                    events.append(Event("entered", frame.index, frame.index, (identity,)))
+                continue
+            identity = identity or next_id
+            next_id = max(next_id, identity + 1)
+            one = self._newborn(mask, lab, place, regions, number, frame, state.next_key + len(born), identity)
+            born.append(one)
+            held.append(mask)
+            events.append(Event("entered", frame.index, frame.index, (identity,)))
+        if not masks:
+            waiting = list(state.waiting)
+        return [*targets, *born], born, tuple(waiting), events
+
+    def _newborn(
+        self,
+        mask: Mask,
+        lab: NDArray[np.uint8],
+        place: Place,
+        regions: Regions,
+        row: int,
+        frame: Frame,
+        key: int,
+        identity: int,
+    ) -> Target:
+        """Return an object that is a region (§III: the initialisation phase)."""
+        height, width = mask.bits.shape
+        cell = float(_cell_of(width, height, self.ring, self.cells))
+        state = observer.initial(mask.bits, mask.x, mask.y, self._group, cell)
+        pose = observer.pose_of(state, self._group)
+        window = window_round(state.shape, pose, self.ring, self.cells)
+        colours = window.cut(lab).astype(np.float32)
+        depth = window.drawn(state.shape, pose)
+        within = window.inside((lab.shape[0], lab.shape[1]))
+        own, other = colours[(depth < 0) & within], colours[(depth > 2) & within]
+        inner, outer = fitted(own, self.components, None), fitted(other, self.components, None)
+        if not regions.masks[row].area:  # a box: what is in it, by its colours (§III, the initialisation phase)
+            likely = np.clip(log_density(inner, colours) - log_density(outer, colours), -self.bound, self.bound)
+            state = observer.settled_shape(
+                state, self._measured(window, likely, within), self.curvature, self._group
+            )
+            pose = observer.pose_of(state, self._group)
+            depth = window.drawn(state.shape, pose)
+        layer = learnt_layer(None, window, colours, (depth < -0.5) & within, pose, 1.0)
+        return Target(
+            key, identity, state, Looks(inner, outer, inner, outer, layer), mask, 1.0, float(mask.area), np.zeros(self._group.dimension), 1, 0.0, frame.time,
+            float(regions.scores[row]), str(regions.classes[row]), (row,),
+            bool(regions.data["mark"][row]) if "mark" in regions.data else False,
+        )  # fmt: skip
+
+
+def _share(depth: Float, one: Measured, reach: int) -> float:
+    """Which share of a silhouette, signed distances (h, w), has support in the picture: in it or within reach of it."""
+    return min(1.0, float(((depth < reach) & (one.pull < 0)).sum() / max((depth < 0).sum(), 1)))
+
+
+def _support(depth: Float, one: Measured, reach: int) -> float:
+    """How many pixels look like the object, in a silhouette, signed distances (h, w), and within reach of it."""
+    return float(((depth < reach) & (one.pull < 0)).sum()) * one.step**2
+
+
+def _cell_of(width: int, height: int, ring: float, cells: int) -> int:
+    """Return how many pixels a cell is across, for an object of so many pixels."""
+    step = 1
+    while (width + 2 * ring) * (height + 2 * ring) > cells * step * step:
+        step *= 2
+    return step
+
+
+def _mask_of(regions: Regions, row: int, size: tuple[int, int]) -> Mask:
+    """The silhouette of a region inside a picture (height, width); its box where there is none."""
+    height, width = size
+    if regions.masks[row].area:
+        return disjoint([regions.masks[row]], height, width)[0]
+    x1, y1, x2, y2 = np.clip(np.rint(regions.boxes[row]), 0, (width, height, width, height)).astype(int).tolist()
+    return Mask(y1, x1, np.ones((y2 - y1, x2 - x1), np.bool_))
+
+
+def _marked_before(targets: list[Target], held: list[Mask], mask: Mask, identity: int) -> int | None:
+    """Which object a mark means, if any: the one of that id, or one of no mark that is where the mark is."""
+    same = [number for number, one in enumerate(targets) if one.id == identity]
+    if same or not targets:
+        return same[0] if same else None
+    common = mask_overlaps([mask], held[: len(targets)])[0]
+    free = [number for number, one in enumerate(targets) if not one.marked and common[number] >= _MARKED]
+    return max(free, key=common.__getitem__, default=None)
