@@ -405,18 +405,20 @@ def _forces(
 
 def _drawn_back(slopes: Float, velocities: Float, group: lie.Group) -> Float:
     """∂φ / ∂v_i (k, D) from the slopes (k, D) of every pose by a motion about its own origin."""
-    steps = group.exp(velocities)
-    count, size = slopes.shape
-    out = np.zeros_like(slopes)
-    carried = np.zeros(size)  # by a motion right after frame i, of everything from i on
-    for i in range(count - 1, -1, -1):
+    steps, out = group.exp(velocities), np.zeros_like(slopes)
+    turned = steps.copy()
+    turned[:, :2, 2] = 0.0
+    bent, spread = group.adjoint(turned), group.left_jacobian(velocities)  # (k, D, D)
+    about = group.jacobian(
+        steps[:, :2, 2]
+    )  # (k, 2, D): turning about the origin before a step moves the one after it
+    carried = np.zeros(slopes.shape[1])  # by a motion right after frame i, of everything from i on
+    for i in range(len(slopes) - 1, -1, -1):
         carried = carried + slopes[i]
-        about = carried.copy()  # turning about the origin before the step moves the one after it, too
-        about[2:] += group.jacobian(steps[i][:2, 2])[:, 2:].T @ carried[:2]
-        out[i] = group.left_jacobian(velocities[i]).T @ about
-        turned = np.eye(3)
-        turned[:2, :2] = steps[i][:2, :2]
-        carried[2:] = group.adjoint(turned)[2:, 2:].T @ carried[2:]
+        pulled = carried.copy()
+        pulled[2:] += about[i, :, 2:].T @ carried[:2]
+        out[i] = spread[i].T @ pulled
+        carried[2:] = bent[i, 2:, 2:].T @ carried[2:]
     return out
 
 

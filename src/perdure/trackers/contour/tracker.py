@@ -38,6 +38,7 @@ Float = NDArray[np.float64]
 Single = NDArray[np.float32]
 _HIDDEN = 0.15  # share of a silhouette that is seen, below which nothing is
 _FROZEN = 0.6  # below which nothing is learnt of its shape and looks
+_WIDER = 3.0  # by which the search grows in a second
 _STEADY = 0.08  # rate at which the velocity for hidden times follows
 _WHOLE = 0.9  # below which it is only shifted: no turn or growth is believed
 _MORE, _LESS = 0.2, 0.015  # rates at which the usual support follows what is seen, where that is more, or less
@@ -177,7 +178,8 @@ class Contour:
         weights = Weights(self.place, self.trust, self.bound)
         size = (lab.shape[0], lab.shape[1])
         pose = observer.predicted(target.state, self._group)
-        window = window_round(target.state.shape, pose, self.ring, self.cells)
+        ring = self.ring + self._searched(target) - self.search
+        window = window_round(target.state.shape, pose, ring, self.cells)
         colours = window.cut(lab).astype(np.float32)
         inside = window.inside(size)
         depth = window.drawn(target.state.shape, pose)
@@ -189,7 +191,7 @@ class Contour:
         state = observer.towards(target.state, pose, self._group)
         if target.missed == 0 or _support(depth, one, self.reach) >= _HIDDEN * target.usual:
             found = self._registered(state, one, edge, target.visible >= _WHOLE)
-            near = self.reach / 2 * window.step if target.visible < _WHOLE and not target.missed else np.inf
+            near = self.reach / 2 * window.step if target.visible < _WHOLE else np.inf
             pose = found if np.abs(found[:2, 2] - pose[:2, 2]).max() <= near else pose
             state = observer.towards(target.state, pose, self._group)
         depth = window.drawn(target.state.shape, pose)
@@ -220,8 +222,7 @@ class Contour:
 
         E(d) = const + the sum of f_in - f_out over the silhouette; far shifts must gain more.
         """
-        search = self.search * (1 if target.missed == 0 else 2)
-        most = max(1, int(search / one.step))
+        most = max(1, int(self._searched(target) / one.step))
         out = np.zeros((3, 3))
         inside = depth < 0
         rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
@@ -240,6 +241,10 @@ class Contour:
             return out
         out[0, 2], out[1, 2] = float(x[best]) * one.step, float(y[best]) * one.step
         return out
+
+    def _searched(self, target: Target) -> float:
+        """Return how far an object is looked for, pixels: the farther, the longer it has not been seen."""
+        return self.search * (1 + _WIDER * target.missed)
 
     def _registered(self, state: State, one: Measured, edge: float, whole: bool) -> Float:
         """Return the pose (3, 3) of the contour in this frame alone."""
