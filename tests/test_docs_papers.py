@@ -21,6 +21,11 @@ PAPERS = {
         "IV.C",
         "IV.D",
     ],
+    "contour-observer.md": [
+        *(f"eq. {number}" for number in range(1, 7)),
+        "§III, prediction",
+        "§III, initialisation",
+    ],
     "track-and-cut.md": [*(f"eq. {number}" for number in range(1, 19)), "§3.3", "§3.4", "§4", "§6"],
 }
 
