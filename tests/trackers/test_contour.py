@@ -18,6 +18,7 @@ from perdure.trackers.contour.observer import Gains, State
 from perdure.types import Frame, Mask, Regions, Report, Scene, Status, Tracks
 
 HEIGHT, WIDTH = 120, 200
+DEFAULTS = Contour()
 GROUPS = pytest.mark.parametrize("group", lie.GROUPS.values(), ids=list(lie.GROUPS))
 
 
@@ -63,7 +64,8 @@ def follow_shapes(
         shape = egg(*path(k))
         state = paper.updated(
             state, of_shape(shape), gains, group,
-            window=5, steps=10, motion=paper.MOTIONS[motion], reach=6, curvature=0.02,
+            window=DEFAULTS.window, steps=DEFAULTS.iterations, motion=paper.MOTIONS[motion],
+            reach=DEFAULTS.reach, curvature=DEFAULTS.curvature,
         )  # fmt: skip
         there = levelset.moments(levelset.signed_distance(shape)).centroid
         places.append(np.hypot(*(centroid(state) - there)))
@@ -123,8 +125,7 @@ def test_the_error_of_a_target_of_constant_velocity_decays_for_every_gain(gain: 
 
 
 def test_with_the_defaults_a_constant_velocity_is_known_within_fifteen_frames():
-    defaults = Contour()
-    gains = Gains(defaults.shape_gain, defaults.motion_gain)
+    gains = Gains(DEFAULTS.shape_gain, DEFAULTS.motion_gain)
     places, speeds = follow_shapes(lambda k: (60 + 3.3 * k, 70 + 0.6 * k), 36, gains)
     assert places[14:].max() < 0.2
     assert speeds[14:].max() < 0.05
