@@ -20,7 +20,6 @@ Float = NDArray[np.float64]
     changed(np.float64),
     changed(np.float64, 2),
     changed(np.float64, 2),
-    counted=False,
 )
 def forces(
     edges: Float,
