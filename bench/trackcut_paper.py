@@ -772,7 +772,7 @@ STAGES: dict[str, tuple[Any, str]] = {  # stage -> where its function is looked 
     "expect": (trackcut, "expect"),
     "cut": (trackcut.TrackCut, "_cut"),
     "separate": (trackcut.TrackCut, "_separated"),
-    "learn": (trackcut.TrackCut, "_learnt"),
+    "learn": (trackcut, "learnt"),
 }
 
 

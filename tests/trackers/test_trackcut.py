@@ -13,9 +13,10 @@ from perdure.fold import settle
 from perdure.trackers.trackcut import TrackCut
 from perdure.trackers.trackcut.cutting import contrast, touching
 from perdure.trackers.trackcut.likelihoods import of_motions
+from perdure.trackers.trackcut.moving import similarity
 from perdure.trackers.trackcut.places import vote
 from perdure.trackers.trackcut.separating import clusters
-from perdure.trackers.trackcut.shapes import depth, in_window, similarity, to_shape
+from perdure.trackers.trackcut.shapes import depth, in_window, to_shape
 from perdure.trackers.trackcut.windows import Window, around
 from perdure.types import Frame, Mask, Regions, Report, Scene, Status, Tracks
 

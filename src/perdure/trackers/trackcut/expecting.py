@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from perdure.trackers.trackcut.likelihoods import of_colours, of_motions
 from perdure.trackers.trackcut.moving import similarity
 from perdure.trackers.trackcut.places import vote
+from perdure.trackers.trackcut.placing import Company, placed
 from perdure.trackers.trackcut.seeing import Motion, Sight
 from perdure.trackers.trackcut.shapes import depth, in_window, recent_motion
 from perdure.trackers.trackcut.targets import Target
@@ -74,6 +75,7 @@ def expect(
     ring: float,
     cells: int,
     weights: Weights,
+    company: Company | None = None,
 ) -> Expected:
     """Return what is expected of an object, and the evidence round it.
 
@@ -91,6 +93,8 @@ def expect(
         How many are looked at, at most.
     weights : Weights
         Of the evidence.
+    company : Company, optional
+        Among whom it is.
     """
     drift = carried(target, motion)
     window = _window(target, drift, ring, cells, sight)
@@ -101,12 +105,18 @@ def expect(
     last = _carry_mask(target, window, came)
     move, moved = _movement(target, drift, places, flow, motion, _core(last))
     belief = in_window(target.shape, window, move)
+    colours = window.cut(sight.colours)
+    if company is not None:
+        observed, others = window.of_masks(company.observed), window.of_masks(company.places)
+        known = observed if observed.any() else None
+        across, down = placed(belief, colours.astype(np.float32), target.first, company, known, others)
+        belief = _shifted(belief, across, down)
+        moved = moved + np.array([across, down]) * window.step
     whole = belief > 0.5
     lost = np.count_nonzero(last) < _HALF * np.count_nonzero(whole)
     predicted = whole if target.together and whole.any() else last | whole if lost else last
     if not predicted.any():
         predicted = whole
-    colours = window.cut(sight.colours)
     seen = colours.astype(np.float32)
     looks = of_colours(seen, target.first, target.last, weights.trust, weights.bound)
     inner = depth(predicted)
@@ -139,6 +149,8 @@ def _movement(
     if len(own) > _ENOUGH and not target.partly:
         at = places.reshape(-1, 2)[own]
         move = similarity(at[:, 0], at[:, 1], flow.reshape(-1, 2)[own])
+        if target.together:  # what is seen of it is a part, that tells little of how the whole turns
+            move[0][2:] = 0
         camera = motion.of_camera_at(np.array([move[1]], np.float32))[0]  # in the middle it is as in the mean
         return move, np.asarray(move[0][:2] - camera, np.float64)
     x, y = middle_of(target)
@@ -149,6 +161,16 @@ def _movement(
 def _core(inside: Bits) -> Bits:
     """The pixels whose four neighbours are the object's too."""
     return cv2.erode(inside.view(np.uint8), _CROSS).view(np.bool_)
+
+
+def _shifted(belief: Float, across: int, down: int) -> Float:
+    """Return a silhouette (h, w), moved by whole cells."""
+    moved = np.zeros_like(belief)
+    height, width = belief.shape
+    into = (slice(max(down, 0), height + min(down, 0)), slice(max(across, 0), width + min(across, 0)))
+    of = (slice(max(-down, 0), height + min(-down, 0)), slice(max(-across, 0), width + min(-across, 0)))
+    moved[into] = belief[of]
+    return moved
 
 
 def _carry_mask(target: Target, window: Window, came: Float) -> Bits:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.maths.mixture import Mixture, fit, log_ratio, subsample
+from perdure.maths.mixture import Mixture, fit, log_density, log_ratio, subsample
 from perdure.trackers.trackcut.targets import Colours
 
 Float = NDArray[np.float32]
@@ -13,6 +13,7 @@ _SAMPLE = 2000  # pixels a mixture is fitted to, at most
 _FLOOR = 4.0  # least variance of colours
 _STEPS = 4  # of EM
 _LEAST_TRUST = 1e-9  # in either looks
+_FAR = 25.0  # nats: as unlikely as a colour may be
 _STILL = 0.4  # px a frame by which flow errs at least
 _ROUGH = 0.1  # share of a motion by which parts of an object differ from it
 
@@ -44,6 +45,11 @@ def of_colours(points: Float, first: Colours, last: Colours, trust: float, bound
     sure, unsure = trust + _LEAST_TRUST, 1 - trust + _LEAST_TRUST
     own, other = ([(first.own, sure), (last.own, unsure)], [(first.other, sure), (last.other, unsure)])
     return log_ratio(points, own, other, bound)
+
+
+def of_looks(points: Float, looks: Colours) -> Float:
+    """Return ln p (N,) of colours (N, 3) under an object's looks."""
+    return np.asarray(np.maximum(log_density(looks.own, points), -_FAR), np.float32)
 
 
 def of_motions(flow: Float, sure: NDArray[np.bool_], bound: float, known: Float | None = None) -> Float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perdure.maths.flow import Flow, dense, global_motion
 from perdure.trackers.trackcut.windows import ONE_MAP, Window
-from perdure.types import Bits, Image
+from perdure.types import Bits, Image, Mask
 
 Float = NDArray[np.float32]
 _FLOW_ROWS = 300  # rows of the picture, about, in which flow is looked for
@@ -65,3 +65,9 @@ def motion_between(before: NDArray[np.uint8], now: Sight, things: Bits) -> Motio
     return Motion(
         dense(before, now.grey, preset="medium", astray=np.inf), global_motion(before, now.grey, things), now.step
     )
+
+
+def colours_of(sight: Sight, mask: Mask) -> Float:
+    """Return the colours (N, 3) of the pixels of a mask that lies inside the picture."""
+    x1, y1, x2, y2 = mask.box
+    return np.asarray(sight.colours[y1:y2, x1:x2][mask.bits], np.float32)

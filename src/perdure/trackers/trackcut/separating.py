@@ -19,6 +19,7 @@ Float = NDArray[np.float32]
 _OUTSIDE = 4.0  # κ: what a pixel outside an object's prediction costs it
 _LOOKS = 0.3  # weight of what a pixel looks like
 _FAR = 0.1  # of each cell of distance from the prediction
+_BEFORE = 1.0  # what a pixel that was another's in the frame before costs
 _MARGIN = 4.0  # pixels round a cluster
 
 
@@ -37,6 +38,7 @@ def clusters(masks: list[Mask]) -> list[list[int]]:
 def separate(
     masks: list[Mask],
     predicted: list[Shape],
+    before: list[Mask],
     looks: list[Callable[[Float], Float]],
     colours: NDArray[np.uint8],
     weight: float,
@@ -50,6 +52,8 @@ def separate(
         What each object claims.
     predicted : list of Shape
         Where each should be.
+    before : list of Mask
+        What each had in the frame before, every pixel carried on by flow.
     looks : list of functions
         Of each object: ln p (h, w) of colours (h, w, 3).
     colours : (H, W, 3) uint8
@@ -68,6 +72,11 @@ def separate(
     unary = np.zeros((len(masks), *window.shape), np.float64)
     for number, shape in enumerate(predicted):
         inside = in_window(shape, window) > 0.5
-        unary[number] = _OUTSIDE * ~inside - _LOOKS * looks[number](seen) - _FAR * np.clip(depth(inside), -20, 20)
+        unary[number] = (
+            _OUTSIDE * ~inside
+            - _BEFORE * (window.of_mask(before[number]) > 0.5)
+            - _LOOKS * looks[number](seen)
+            - _FAR * np.clip(depth(inside), -20, 20)
+        )
     labels = expand(unary, costs.astype(np.float64), domain=domain).labels
     return [window.to_mask((labels == number) & domain, height, width) for number in range(len(masks))]

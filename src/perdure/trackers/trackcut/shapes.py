@@ -2,43 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.trackers.trackcut.targets import RECENT, Shape, Target
+from perdure.features.masks import mask_shares
+from perdure.trackers.trackcut.targets import LATEST, Shape, Target
 from perdure.trackers.trackcut.windows import Window
+from perdure.types import Mask
 
 Float = NDArray[np.float32]
-_TURN = 0.05  # rad, or share of the size, by which a shape may turn or grow from frame to frame
-_STEPS = 6  # of the robust fit
-_FEW = 800  # cells that it looks at, about
-
-
-def similarity(x: Float, y: Float, flow: Float) -> tuple[NDArray[np.float64], tuple[float, float]]:
-    """Return (dx, dy, growth, turn) that fit motions (N, 2) at places x, y (N,) about their middle, and the middle.
-
-    Least squares, of which what lies far off counts little (Cauchy), as parts of an object move by themselves.
-    """
-    step = max(1, len(x) // _FEW)
-    middle = (float(x.mean()), float(y.mean()))
-    across, down, moved = x[::step] - middle[0], y[::step] - middle[1], flow[::step].astype(np.float64)
-    one, none = np.ones(len(across)), np.zeros(len(across))
-    design = np.concatenate([np.stack([one, none, across, -down], 1), np.stack([none, one, down, across], 1)])
-    aim, weight = moved.T.ravel(), np.ones(2 * len(across))
-    for _ in range(_STEPS):
-        found = np.linalg.lstsq(design * weight[:, None], aim * weight, rcond=None)[0]
-        off = np.hypot(*(aim - design @ found).reshape(2, -1))
-        scale = max(1.5 * float(np.median(off)), 0.3)
-        weight = np.tile(1 / (1 + (off / scale) ** 2), 2)
-    found[2:] = np.clip(found[2:], -_TURN, _TURN)
-    return np.asarray(found, np.float64), middle
+_COVERED = 0.5  # share of a silhouette that others must be before, for it to be hidden by them
+_NEARER = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the way to the middle of another
+_NONE = 0.05  # belief that is none
 
 
 def recent_motion(target: Target) -> NDArray[np.float64]:
-    """Return the mean (2,) of the last displacements (eq. 16; eq. 2 where there is one)."""
+    """Return the displacement (2,), px a frame, of the last frames (eq. 16; eq. 2 where there is one).
+
+    It is the mean of five, as the paper has it, where motion is that of flow alone. Where a detector says how the whole
+    silhouette moved, it is the median of more: limbs swing, and who goes behind something seems to slow down.
+    """
     known = target.motions[np.isfinite(target.motions[:, 0])]
-    return known[-RECENT:].mean(axis=0) if len(known) else np.zeros(2)
+    if not len(known):
+        return np.zeros(2)
+    return known[-LATEST:].mean(axis=0) if target.marked else np.asarray(np.median(known, axis=0))
 
 
 def in_window(
@@ -74,6 +64,61 @@ def to_shape(belief: Float, window: Window) -> Shape:
         return Shape(float(window.y1), float(window.x1), np.zeros((1, 1), np.float32))
     top, bottom, left, right = rows.min(), rows.max() + 1, columns.min(), columns.max() + 1
     return Shape(float(window.y1 + top), float(window.x1 + left), belief[top:bottom, left:right].copy())
+
+
+def behind(shape: Shape, others: Sequence[Mask], before: bool) -> tuple[Shape, bool]:
+    """Return where an object is that is not seen, and whether others that are seen are before it.
+
+    What is not seen is where it cannot be seen: one that was behind others, and should have come out from behind them
+    but was not seen to, is moved towards the nearest of them until half of it is covered.
+    """
+    whole = shape.to_mask()
+    others = [one for one in others if one.area]
+    if not whole.area or not others:
+        return shape, False
+    if mask_shares([whole], others).sum() >= _COVERED:
+        return shape, True
+    if not before:
+        return shape, False
+    x1, y1, x2, y2 = shape.box
+    middles = [((one.box[0] + one.box[2]) / 2, (one.box[1] + one.box[3]) / 2) for one in others]
+    ways = [(x - (x1 + x2) / 2, y - (y1 + y2) / 2) for x, y in middles]
+    across, down = min(ways, key=lambda way: float(np.hypot(*way)))
+    if np.hypot(across, down) > max(x2 - x1, y2 - y1):
+        return shape, False
+    for share in _NEARER:
+        moved = Shape(shape.y + share * down, shape.x + share * across, shape.belief)
+        if mask_shares([moved.to_mask()], others).sum() >= _COVERED:
+            return moved, True
+    return shape, False
+
+
+def over(shape: Shape, piece: Mask) -> Shape:
+    """Return a shape, moved as little as it takes for its box to hold a piece, or the piece's to hold it."""
+    x1, y1, x2, y2 = shape.box
+    left, top, right, bottom = piece.box
+
+    def off(low: float, high: float, begin: float, end: float) -> float:
+        before, after = begin - low, end - high  # by which it lies over the one and the other side
+        if before >= 0 >= after or before <= 0 <= after:
+            return 0.0
+        return min(before, after, key=abs)
+
+    return Shape(shape.y + off(y1, y2, top, bottom), shape.x + off(x1, x2, left, right), shape.belief)
+
+
+def of_size(belief: Float, least: float, most: float) -> Float:
+    """Return a belief (h, w) of which at least so many, and at most so many cells are believed rather than not."""
+    believed = float((belief > 0.5).sum())
+    if least <= believed <= most:
+        return belief
+    wanted = int(min(max(believed, least), most))
+    known = np.sort(belief[belief > _NONE])[::-1]
+    if not len(known) or wanted <= 0:
+        return belief
+    level = float(known[min(wanted, len(known)) - 1])
+    raised = np.clip(belief + np.float32(0.5 + 1e-3 - level), 0.0, 1.0)
+    return np.asarray(raised * (belief > _NONE), np.float32)
 
 
 def depth(inside: NDArray[np.bool_]) -> Float:

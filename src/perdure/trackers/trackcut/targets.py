@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from perdure.maths.mixture import Mixture
 from perdure.types import Mask
 
-RECENT = 5  # frames whose motions are averaged (eq. 16)
+RECENT = 15  # frames whose motions are remembered: longer than a stride
+LATEST = 5  # of them, that tell where an object goes of which only flow is known (eq. 16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +69,17 @@ class Target:
     seen_frames: int
     born: float  # s
     missed: float  # s for which nothing of it was seen
+    missing: float  # s of them for which nothing that is seen was before it
     partly: bool  # whether it is thought to be partially occluded
     small: float  # s for which it has been
     together: bool  # whether others touch it or share an observation with it
     score: float
     class_: str
     links: tuple[int, ...]  # observations that were matched with it in this frame
+    unseen: int  # frames for which nothing of it was seen
+    doubted: float  # s for which no observation was its own, though there were others
+    company: frozenset[int]  # keys of those it has been together with, and may be mistaken for
+    alone: int  # frames for which it has been seen by itself since
+    pieces: float  # frames for which it has held several regions
+    squeezed: int  # frames for which it has had a small share of what is another's silhouette
     marked: bool  # whether the user marked it, so that its first looks are surely its own

@@ -8,37 +8,32 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.masks import disjoint, mask_overlaps, mask_shares
+from perdure.features.masks import disjoint
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
+from perdure.trackers.trackcut.births import Nursery, births
+from perdure.trackers.trackcut.companies import companies, company_of, hosts, sharing
+from perdure.trackers.trackcut.competing import Claim, claims
 from perdure.trackers.trackcut.cutting import Observed, contrast, cut_out, touching
 from perdure.trackers.trackcut.expecting import Expected, Weights, expect
-from perdure.trackers.trackcut.likelihoods import learn_colours, of_colours
+from perdure.trackers.trackcut.learning import FAMILIAR, LONG, Seen, learnt, pieces
+from perdure.trackers.trackcut.likelihoods import of_colours
+from perdure.trackers.trackcut.parting import ALONE, parted
+from perdure.trackers.trackcut.placing import Company
 from perdure.trackers.trackcut.saying import gone, happenings, has_left, rows_of
-from perdure.trackers.trackcut.seeing import Motion, Sight, look_at, motion_between
+from perdure.trackers.trackcut.seeing import Motion, Sight, colours_of, look_at, motion_between
 from perdure.trackers.trackcut.separating import clusters, separate
 from perdure.trackers.trackcut.shapes import to_shape
-from perdure.trackers.trackcut.targets import RECENT, Shape, Target
-from perdure.trackers.trackcut.windows import around
+from perdure.trackers.trackcut.targets import Shape, Target
 from perdure.types import Event, Frame, Mask, Regions, Report, Scene
 
 Float = NDArray[np.float32]
-_GONE = 0.05  # share of its mean size, below which an object is not seen
-_NEW_COVERED = 0.2  # share of an observation that objects may hold, for it to be a new one
-_SAME = 0.3  # share of an observation that one of the frame before held, for both to be one
-_GAIN, _LOSE = 0.5, 0.25  # by which the remembered silhouette takes up and gives up pixels, a frame
-_HALF_SEEN = 0.75  # share of the remembered silhouette below which it gives up nothing
-_KNOWN = 5  # frames from which a size is known (§3.3)
-_SPREAD = 0.05  # of the mean size, that its deviation is at least
-_FAMILIAR = 25  # frames until which an object that came in is still getting known
-_ALONE, _UNSURE = (
-    0.4,
-    2.0,
-)  # s for which an object is too small, seen by itself or without observation, until it has changed
-_MARKED = 0.5  # IoU from which an object is what is marked there
-_RATE = 0.1  # share of a new size
+# Evidence of an observation for its pixels, against that of none: shared, its own, its own while the object comes in.
+_SHARED, _OWN, _OF_NEW = 0.5, 1.0, 4.0
 _ALIKE = 0.5  # nats a pixel by which what is found must look more like the object than like its surroundings
-_SIMILAR = (0.4, 2.5)  # ratio of sizes of one that is found again
+_LARGER = 1.6  # times its mean size, from which an observation is not one object's alone
+_REFUSED = 3.0  # of that evidence, more, against the observations that are not the object's
+_OTHERS = 0.5  # of the evidence against what lies outside its observations: against the places of others
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +106,23 @@ class TrackCut:
         events: list[Event] = []
         if state.grey.shape == sight.grey.shape and targets:
             motion = motion_between(state.grey, sight, _things(targets, sight))
-            targets = self._followed(state, targets, frame, sight, motion, observations, regions.blind)
-        targets, born, waiting, told = self._born(state, targets, frame, sight, regions, observations)
-        events += told
-        next_id = max([state.next_id, *(one.id + 1 for one in born)])
+            targets, events = self._followed(state, targets, frame, sight, motion, observations, regions.blind)
+        nursery = Nursery(
+            self.smallest * state.size[0] * state.size[1],
+            self.ring,
+            self.cells,
+            self.components,
+            self.trust,
+            self.bound,
+        )
+        waiting = state.waiting if len(state.colours) else None
+        keys = (state.next_key, state.next_id)
+        born = births(nursery, targets, waiting, keys, frame, sight, regions, observations)
+        targets, events = born.targets, events + born.events
+        next_id = max([state.next_id, *(one.id + 1 for one in targets[len(targets) - born.new :])])
         kept = []
         for one in targets:
-            if one.missed > self.hidden_for + 1e-9 or has_left(one, state.size):
+            if one.missing > self.hidden_for + 1e-9 or has_left(one, state.size):
                 events.append(gone(one, frame, state.size))
             else:
                 kept.append(one)
@@ -125,10 +130,10 @@ class TrackCut:
         events += happenings(state.targets, kept, frame)
         state = TrackCutState(
             tuple(kept),
-            waiting,
+            born.waiting,
             sight.colours,
             sight.grey,
-            state.next_key + len(born),
+            state.next_key + born.new,
             next_id,
             frame.time,
             state.size,
@@ -148,64 +153,92 @@ class TrackCut:
         motion: Motion,
         observations: list[Mask],
         blind: bool,
-    ) -> list[Target]:
-        """Return the objects as they are in this frame."""
+    ) -> tuple[list[Target], list[Event]]:
+        """Return the objects as they are in this frame, and whose names were exchanged."""
         weights = Weights(self.looks, self.trust, self.place, self.moving, self.form, self.bound)
-        found: list[tuple[Expected, NDArray[np.bool_], tuple[int, ...]]] = []
+        height, width = state.size
+        ahead: list[Expected] = []
+        among: list[Company | None] = []
         for target in targets:
-            ring, fineness = self.ring, self.cells
-            if target.links and observations:  # it is where it was observed: looked at closely
-                ring, fineness = ring / 2, fineness * 4
-            for _ in range(2):
-                expected = expect(target, state.colours, sight, motion, ring, fineness, weights)
-                cells, matched, touches = self._cut(target, expected, [] if blind else observations)
-                if not touches:
-                    break
-                ring *= 2
+            ring, fineness = self._closeness(target, observations)
+            among.append(company_of(target, targets, ahead, [] if blind else observations, state.size))
+            ahead.append(expect(target, state.colours, sight, motion, ring, fineness, weights, among[-1]))
+        predicted = [one.window.to_mask(one.predicted, height, width) for one in ahead]
+        there = [one.missed == 0 for one in targets]
+        halves = [one.pieces >= LONG for one in targets]
+        claimed = claims(predicted, there, halves, [] if blind else observations)
+        owned = {claim.number for some in claimed for claim in some}
+        found: list[tuple[Expected, NDArray[np.bool_], tuple[int, ...]]] = []
+        for number, (target, expected) in enumerate(zip(targets, ahead, strict=True)):
+            others = [one for k, one in enumerate(predicted) if k != number and there[k]]
+            known = {claim.number for claim in claimed[number]}
+            refused = [] if blind else [one for k, one in enumerate(observations) if k not in known]
+            cells, matched, touches = self._cut(target, expected, claimed[number], others, refused)
+            if touches:
+                ring, fineness = self._closeness(target, observations)
+                expected = expect(target, state.colours, sight, motion, 2 * ring, fineness, weights, among[number])
+                cells, matched, _ = self._cut(target, expected, claimed[number], others, refused)
+            nobodys = [one for k, one in enumerate(observations) if k not in owned]
+            if not blind and nobodys:  # what it has let go of is no part of it
+                expected = expected._replace(belief=expected.belief * ~expected.window.of_masks(nobodys))
             if blind:  # §6: only the prediction is kept
                 cells, matched = expected.predicted, ()
             found.append((expected, cells, matched))
-        height, width = state.size
         masks = [expected.window.to_mask(cells, height, width) for expected, cells, _ in found]
         met = clusters(masks)
         if self.second:
             masks = self._separated(targets, masks, found, sight)
         waited = 0.0 if blind else frame.time - state.time
         links = [matched for *_, matched in found]
-        shared = [
-            any(set(one) & set(other) for place, other in enumerate(links) if place != k)
-            for k, one in enumerate(links)
-        ]
-        for some in met:
-            for k in some:
-                shared[k] = True
-        return [
-            self._learnt(target, expected, mask, (matched, common), sight, waited, blind)
-            for target, (expected, _, matched), mask, common in zip(targets, found, masks, shared, strict=True)
-        ]
+        near = sharing(links, met)
+        shared = [bool(row.any()) for row in near]
+        squeezed, masks = hosts(targets, masks, near)
+        company = companies(targets, masks, predicted, near)
+        after = []
+        for number, (target, (expected, _, matched), mask) in enumerate(zip(targets, found, masks, strict=True)):
+            others = [one for k, one in enumerate(masks) if k != number]
+            if target.pieces >= LONG and claimed[number]:  # it was two: what it keeps is its size
+                target = replace(target, mean=float(max(mask.area, 1)), variance=0.0)
+            target = replace(
+                target,
+                company=company[number],
+                pieces=pieces(target, claimed[number]),
+                squeezed=squeezed[number],
+            )
+            seen = Seen(expected, mask, others, matched, shared[number], motion, waited, bool(observations), blind)
+            after.append(learnt(target, seen, self.components))
+        asked = {one.key: colours_of(sight, one.mask) for one in after if one.company and one.alone >= ALONE}
+        return parted(after, asked, frame)
+
+    def _closeness(self, target: Target, observations: list[Mask]) -> tuple[float, int]:
+        """Return the ring round an object, px, and the cells in it; one that was observed is looked at closely."""
+        return (self.ring / 2, 4 * self.cells) if target.links and observations else (self.ring, self.cells)
 
     def _cut(
-        self, target: Target, expected: Expected, observations: list[Mask]
+        self, target: Target, expected: Expected, claimed: list[Claim], others: list[Mask], refused: list[Mask]
     ) -> tuple[NDArray[np.bool_], tuple[int, ...], bool]:
         """Return the pixels of least energy, the observations matched, and whether they reach the ring."""
         window, colours = expected.window, expected.colours
         costs, sigma = contrast(colours, self.contrast)
         seen, numbers = [], []
-        unary = expected.unary
-        covered = np.zeros(window.shape, np.bool_)
-        for number, mask in enumerate(observations):
-            cells = window.of_mask(mask) > 0.5
+        held = np.zeros(window.shape, np.float32)
+        for claim in claimed:
+            cells = window.of_mask(claim.part) > 0.5
             if not cells.any():
                 continue
-            covered |= cells
-            if not (cells & expected.predicted).any():
-                continue
+            new = target.seen_frames < FAMILIAR and not target.marked
+            trust = _SHARED
+            if claim.alone and (new or claim.part.area < _LARGER * target.mean):
+                trust = _OF_NEW if new else _OWN
+            held[cells] = np.maximum(held[cells], trust)
             mean = colours[cells].mean(axis=0)
             ratio = float(of_colours(mean[None], target.first, target.last, self.trust, self.bound)[0])
             seen.append(Observed(cells, ratio, mean))
-            numbers.append(number)
+            numbers.append(claim.number)
+        unary = expected.unary + np.float32(_OTHERS * self.outside) * _elsewhere(others, expected)
         if seen:
-            unary = unary + np.float32(self.outside) * np.where(covered, -0.5, 1.0).astype(np.float32)
+            unary = unary + np.float32(self.outside) * np.where(held > 0, -held, 1.0).astype(np.float32)
+            unary[window.of_masks(refused) & (held == 0)] += _REFUSED * self.outside
         best = cut_out(unary, costs, sigma, colours, seen, self.link, self.bound / 4)
         anchors = expected.predicted.copy()
         for one, matched in zip(seen, best.matched, strict=True):
@@ -231,160 +264,13 @@ class TrackCut:
         for some in clusters(masks):
             shapes = [_as_shape(found[k][0], targets[k].together) for k in some]
             looks = [_log_density_of(targets[k]) for k in some]
-            parts = separate([masks[k] for k in some], shapes, looks, sight.colours, self.apart, self.cells)
+            before = [found[k][0].window.to_mask(found[k][0].last, *sight.colours.shape[:2]) for k in some]
+            parts = separate(
+                [masks[k] for k in some], shapes, before, looks, sight.colours, self.apart, self.cells
+            )
             for k, mask in zip(some, parts, strict=True):
                 masks[k] = mask
         return masks
-
-    def _learnt(
-        self,
-        target: Target,
-        expected: Expected,
-        mask: Mask,
-        matched: tuple[tuple[int, ...], bool],
-        sight: Sight,
-        waited: float,
-        blind: bool,
-    ) -> Target:
-        """Return an object brought up to date with its pixels."""
-        window, size = expected.window, mask.area
-        links, shared = matched
-        motions = np.concatenate([target.motions[1:], [expected.moved]])
-        if size < max(_GONE * target.mean, 4.0):
-            shape = to_shape(expected.belief, window)
-            return replace(
-                target, mask=Mask.empty(), shape=shape, missed=target.missed + waited, links=(), partly=False
-            )
-        cells = window.of_mask(mask) > 0.5
-        deviation = max(float(np.sqrt(target.variance)), _SPREAD * target.mean)
-        partly = target.seen_frames >= _KNOWN and size < target.mean - 3 * deviation
-        belief = expected.belief
-        small = target.small + waited if partly and not shared else 0.0
-        if small > (_ALONE if links else _UNSURE):
-            partly, small = False, 0.0
-        hidden = shared or cells.sum() < _HALF_SEEN * (belief > 0.5).sum()
-        rate = np.where(cells, _GAIN / 5 if shared else _GAIN, 0.0 if hidden else _LOSE).astype(np.float32)
-        shape = to_shape((belief + rate * (cells - belief)).astype(np.float32), window)
-        motions = target.motions if partly or target.partly else motions
-        target = replace(
-            target,
-            mask=mask,
-            shape=shape,
-            motions=motions,
-            missed=0.0,
-            links=links,
-            partly=partly,
-            small=small,
-            together=shared,
-        )
-        if partly or blind or shared:
-            return target
-        last = learn_colours(expected.colours, cells, np.ones_like(cells), self.components, target.last)
-        share = max(_RATE, 1.0 / (target.seen_frames + 1))
-        off = size - target.mean
-        first = last if target.seen_frames < _FAMILIAR and not target.marked else target.first
-        return replace(
-            target,
-            first=first,
-            last=last,
-            mean=target.mean + share * off,
-            variance=(1 - share) * (target.variance + share * off**2),
-            seen_frames=target.seen_frames + 1,
-        )
-
-    def _born(
-        self,
-        state: TrackCutState,
-        targets: list[Target],
-        frame: Frame,
-        sight: Sight,
-        regions: Regions,
-        observations: list[Mask],
-    ) -> tuple[list[Target], list[Target], tuple[Mask, ...], list[Event]]:
-        """Found objects on observations that are nobody's (§3.4); lost ones are looked for in them first."""
-        marks = regions.data.get("mark")
-        if marks is None and regions.blind:
-            return targets, [], state.waiting, []
-        taken = {number for one in targets for number in one.links}
-        least = self.smallest * state.size[0] * state.size[1]
-        born: list[Target] = []
-        waiting: list[Mask] = []
-        events: list[Event] = []
-        next_id = max([state.next_id, *(one.id + 1 for one in targets)])
-        for number, mask in enumerate(observations):
-            identity = int(marks[number]) if marks is not None else 0
-            if not identity:
-                held = [one.mask for one in (*targets, *(one for one in born if one.marked))]
-                covered = mask_shares([mask], held).sum()
-                if number in taken or covered >= _NEW_COVERED or mask.area < max(least, 1):
-                    continue
-                if len(state.colours) and not (mask_shares([mask], state.waiting) > _SAME).any():
-                    waiting.append(mask)
-                    continue
-            lost = self._found_again(targets, mask, sight, identity)
-            if lost is not None:
-                was = targets[lost]
-                targets[lost] = self._newborn(mask, sight, regions, number, frame, was.key, identity or was.id)
-                if identity and identity != was.id:
-                    events.append(Event("entered", frame.index, frame.index, (identity,)))
-                continue
-            identity = identity or next_id
-            next_id = max(next_id, identity + 1)
-            born.append(self._newborn(mask, sight, regions, number, frame, state.next_key + len(born), identity))
-            events.append(Event("entered", frame.index, frame.index, (identity,)))
-        if not observations:  # a frame in which nothing was looked for: who waits goes on waiting
-            waiting = list(state.waiting)
-        return [*targets, *born], born, tuple(waiting), events
-
-    def _found_again(self, targets: list[Target], mask: Mask, sight: Sight, identity: int) -> int | None:
-        """Return which object an observation is, if any: the one of that id, the one marked now, a lost one like it."""
-        if identity:
-            same = [number for number, one in enumerate(targets) if one.id == identity]
-            return same[0] if same else _found_there(targets, mask)
-        best, least = None, _ALIKE
-        for number, one in enumerate(targets):
-            if one.missed <= 0 or not _SIMILAR[0] <= mask.area / max(one.mean, 1.0) <= _SIMILAR[1]:
-                continue
-            points = _colours_of(sight, mask)
-            likeness = float(of_colours(points, one.first, one.last, self.trust, self.bound).mean())
-            if likeness > least:
-                best, least = number, likeness
-        return best
-
-    def _newborn(
-        self, mask: Mask, sight: Sight, regions: Regions, row: int, frame: Frame, key: int, identity: int
-    ) -> Target:
-        """Return an object that is an observation."""
-        height, width = sight.colours.shape[:2]
-        window = around([mask.box], self.ring, self.cells, (height, width))
-        cells = window.of_mask(mask)
-        colours = learn_colours(
-            window.cut(sight.colours).astype(np.float32),
-            cells > 0.5,
-            np.ones(cells.shape, np.bool_),
-            self.components,
-        )
-        return Target(
-            key,
-            identity,
-            mask,
-            to_shape(cells, window),
-            colours,
-            colours,
-            np.full((RECENT, 2), np.nan),
-            float(mask.area),
-            0.0,
-            1,
-            frame.time,
-            0.0,
-            False,
-            0.0,
-            False,
-            float(regions.scores[row]),
-            str(regions.classes[row]),
-            (row,),
-            bool(regions.data["mark"][row]) if "mark" in regions.data else False,
-        )
 
 
 def _mask_of(regions: Regions, row: int, size: tuple[int, int]) -> Mask:
@@ -396,11 +282,9 @@ def _mask_of(regions: Regions, row: int, size: tuple[int, int]) -> Mask:
     return Mask(y1, x1, np.ones((y2 - y1, x2 - x1), np.bool_))
 
 
-def _found_there(targets: list[Target], mask: Mask) -> int | None:
-    """Which object of no mark is where a mark is now, if any: half of both is common."""
-    common = mask_overlaps([mask], [one.mask for one in targets])[0] if targets else np.zeros(0)  # (N,)
-    free = [number for number, one in enumerate(targets) if not one.marked and common[number] >= _MARKED]
-    return max(free, key=common.__getitem__, default=None)
+def _elsewhere(others: list[Mask], expected: Expected) -> Float:
+    """1 in the cells (h, w) where another object should be and this one should not, else 0."""
+    return (expected.window.of_masks(others) & ~expected.predicted).astype(np.float32)
 
 
 def _things(targets: list[Target], sight: Sight) -> NDArray[np.bool_]:
@@ -426,8 +310,3 @@ def _log_density_of(target: Target) -> Callable[[Float], Float]:
         return np.asarray(log_density(target.last.own, points).reshape(colours.shape[:2]), np.float32)
 
     return looks
-
-
-def _colours_of(sight: Sight, mask: Mask) -> Float:
-    x1, y1, x2, y2 = mask.box
-    return np.asarray(sight.colours[y1:y2, x1:x2][mask.bits], np.float32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import cv2
@@ -52,6 +52,15 @@ class Window(NamedTuple):
         if self.step == 1:
             return bits
         return np.asarray(cv2.resize(bits, self.shape[::-1], interpolation=cv2.INTER_AREA), np.float32)
+
+    def of_masks(self, masks: Iterable[Mask]) -> Bits:
+        """Return the cells (h, w) that any of some masks holds."""
+        held = np.zeros(self.shape, np.bool_)
+        for one in masks:
+            x1, y1, x2, y2 = one.box
+            if x1 < self.x2 and self.x1 < x2 and y1 < self.y2 and self.y1 < y2:
+                held |= self.of_mask(one) > 0.5
+        return held
 
     def to_mask(self, cells: Bits, height: int, width: int) -> Mask:
         """Return the mask, inside a picture, of the cells (h, w) that are true; edges are made smooth."""
