@@ -157,7 +157,7 @@ def _newborn(
         partly=False,
         small=0.0,
         together=False,
-        company=frozenset(),
+        company=(),
         alone=0,
         pieces=0.0,
         squeezed=0,

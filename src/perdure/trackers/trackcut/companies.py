@@ -30,7 +30,7 @@ def sharing(links: list[tuple[int, ...]], met: list[list[int]]) -> NDArray[np.bo
 
 def companies(
     targets: list[Target], masks: list[Mask], predicted: list[Mask], near: NDArray[np.bool_]
-) -> list[frozenset[int]]:
+) -> list[tuple[int, ...]]:
     """Return whom each object may be mistaken for: with whom it has been together since it was last by itself."""
     keys = {one.key for one in targets}
     hidden = [k for k, mask in enumerate(masks) if not mask.area]
@@ -40,7 +40,7 @@ def companies(
         near[k] |= before
         near[:, k] |= before
     return [
-        frozenset((one.company | {targets[int(k)].key for k in np.flatnonzero(row)}) & keys)
+        tuple(sorted({*one.company, *(targets[int(k)].key for k in np.flatnonzero(row))} & keys))
         for one, row in zip(targets, near, strict=True)
     ]
 

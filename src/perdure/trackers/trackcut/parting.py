@@ -49,7 +49,7 @@ def parted(targets: list[Target], pixels: dict[int, Float], frame: Frame) -> tup
                 names = (targets[place].id, targets[other].id)
                 why = "after they parted each looked like the other"
                 events.append(Event("exchanged", frame.index, frame.index, names, why=why))
-        targets[place] = replace(targets[place], company=frozenset())
+        targets[place] = replace(targets[place], company=())
     return targets, events
 
 

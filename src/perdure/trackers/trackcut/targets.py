@@ -78,7 +78,7 @@ class Target:
     links: tuple[int, ...]  # observations that were matched with it in this frame
     unseen: int  # frames for which nothing of it was seen
     doubted: float  # s for which no observation was its own, though there were others
-    company: frozenset[int]  # keys of those it has been together with, and may be mistaken for
+    company: tuple[int, ...]  # keys of those it has been together with, and may be mistaken for
     alone: int  # frames for which it has been seen by itself since
     pieces: float  # frames for which it has held several regions
     squeezed: int  # frames for which it has had a small share of what is another's silhouette
