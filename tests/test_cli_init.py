@@ -104,7 +104,8 @@ def test_init_may_be_given_several_times_and_a_box_finds_its_silhouette(track):
 
 
 def test_a_tracker_that_follows_marks_is_the_one_that_gets_them(track, monkeypatch):
-    monkeypatch.delitem(TRACKERS, "trackcut")
+    for name in ("trackcut", "contour"):
+        monkeypatch.delitem(TRACKERS, name)
     monkeypatch.setitem(TRACKERS, "hold", Hold)
     done = track("--init", "both.png@10", "--no-video")
     assert (done.code, "does not follow" in done.stderr) == (0, False)
@@ -250,7 +251,8 @@ def test_boxes_without_a_picture_are_marked_as_they_are(track, tmp_path):
 
 
 def test_from_python_masks_may_be_arrays_with_their_frame(monkeypatch):
-    monkeypatch.delitem(TRACKERS, "trackcut")
+    for name in ("trackcut", "contour"):
+        monkeypatch.delitem(TRACKERS, name)
     monkeypatch.setitem(TRACKERS, "hold", Hold)
     indices = RED * 3 + BLUE * 2
     tracks = perdure.track(FILM, init=[(indices, 10), "0,0 5,0 5,5@12"])
@@ -266,7 +268,8 @@ def test_from_python_masks_may_be_arrays_with_their_frame(monkeypatch):
 
 
 def test_of_what_passes_once_only_frame_0_can_be_marked(monkeypatch):
-    monkeypatch.delitem(TRACKERS, "trackcut")
+    for name in ("trackcut", "contour"):
+        monkeypatch.delitem(TRACKERS, name)
     monkeypatch.setitem(TRACKERS, "hold", Hold)
     assert perdure.track((image for image in FILM), init="10,10,20,30").ids.tolist() == [1] * len(FILM)
     for options, said in (

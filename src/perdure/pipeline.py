@@ -263,7 +263,10 @@ def follows_marks(tracker: object) -> bool:
 
 def _default_tracker(*, marked: bool) -> str:
     """The tracker where none is named."""
-    return next((name for name, kind in TRACKERS.items() if marked and follows_marks(kind)), "compound")
+    if not marked:
+        return "compound"
+    known = [name for name, kind in TRACKERS.items() if follows_marks(kind)]
+    return "trackcut" if "trackcut" in known else known[0] if known else "compound"
 
 
 def _refuse_late_start(source: Source, start: str | float | None) -> None:
