@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from films import HEIGHT, WIDTH, Thing, film, followed, overlap, seen, texture, walker
 
 from perdure.trackers.trackcut.births import Nursery, births
 from perdure.trackers.trackcut.competing import apart, claims, divided
@@ -17,7 +18,6 @@ from perdure.trackers.trackcut.seeing import look_at
 from perdure.trackers.trackcut.shapes import behind, of_size, over
 from perdure.trackers.trackcut.targets import RECENT, Colours, Shape, Target
 from perdure.types import Frame, Mask, Regions
-from tests.trackers.test_trackcut import HEIGHT, WIDTH, Thing, film, followed, overlap, seen, texture, walker
 
 RED, BLUE = (170, 60, 60), (60, 60, 170)
 
