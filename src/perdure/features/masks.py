@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.types import Bits, Boxes, Mask
+from perdure.types import Bits, Boxes, Mask, Regions
 
 
 def disjoint(masks: Sequence[Mask], height: int, width: int) -> tuple[Mask, ...]:
@@ -26,6 +26,19 @@ def disjoint(masks: Sequence[Mask], height: int, width: int) -> tuple[Mask, ...]
             mask if np.array_equal(bits, mask.bits) and _is_tight(bits) else Mask.of_image(bits, mask.y, mask.x)
         )
     return tuple(kept)
+
+
+def silhouettes(regions: Regions, height: int, width: int) -> list[Mask]:
+    """Return the silhouette of every region, inside a picture; its box where it has none.
+
+    >>> [mask.box for mask in silhouettes(Regions.of([[-3, 2, 5, 6]]), 9, 9)]
+    [(0, 2, 5, 6)]
+    """
+    edges = np.clip(np.rint(regions.boxes), 0, (width, height, width, height)).astype(int).tolist()
+    return [
+        disjoint([mask], height, width)[0] if mask.area else Mask(y1, x1, np.ones((y2 - y1, x2 - x1), np.bool_))
+        for mask, (x1, y1, x2, y2) in zip(regions.masks, edges, strict=True)
+    ]
 
 
 def holding(boxes: Boxes, masks: Sequence[Mask]) -> Boxes:

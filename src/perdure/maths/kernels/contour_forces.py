@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths.kernels.compile import changed, given, kernel_for, part
+from perdure.maths.kernels.narrow_band import value_at
 
 Float = NDArray[np.float64]
 
@@ -66,7 +67,7 @@ def forces(
         if length == 0.0:
             continue
         at_x, at_y = away_x + pose[0, 2], away_y + pose[1, 2]
-        value = _value(
+        value = value_at(
             field,
             to_field[0, 0] * at_x + to_field[0, 1] * at_y + to_field[0, 2],
             to_field[1, 0] * at_x + to_field[1, 1] * at_y + to_field[1, 2],
@@ -98,16 +99,3 @@ def _motion(which: int, normal_x: float, normal_y: float, x: float, y: float) ->
     if which == 4:
         return x * normal_x - y * normal_y
     return y * normal_x + x * normal_y
-
-
-@part
-def _value(field: Float, x: float, y: float) -> float:
-    """The bilinear value at a point, or at the point of the field that is nearest to it."""
-    height, width = field.shape
-    x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
-    left, top = int(x), int(y)
-    right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
-    across, down = x - left, y - top
-    upper = field[top, left] * (1 - across) + field[top, right] * across
-    lower = field[bottom, left] * (1 - across) + field[bottom, right] * across
-    return float(upper * (1 - down) + lower * down)

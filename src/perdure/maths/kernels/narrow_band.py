@@ -269,7 +269,7 @@ def _lesser(one: float, other: float) -> float:
 def sample(field: Float, points: Float, out: Float) -> None:
     """Write the values (N,) of a picture (H, W) at points (N, 2) x, y between pixels; beyond it those of its border."""
     for n in range(len(points)):
-        out[n] = _value(field, points[n, 0], points[n, 1])
+        out[n] = value_at(field, points[n, 0], points[n, 1])
 
 
 @kernel_for(given(np.float64, 2, "C"), given(np.float64, 2, "C"), float, changed(np.float64, 2))
@@ -294,11 +294,11 @@ def carry(phi: Float, back: Float, scale: float, out: Float) -> None:
             y = back[1, 0] * column + back[1, 1] * row + back[1, 2]
             beyond_x, beyond_y = max(-x, x - (width - 1), 0.0), max(-y, y - (height - 1), 0.0)
             beyond = np.sqrt(beyond_x * beyond_x + beyond_y * beyond_y)
-            out[row, column] = scale * (_value(phi, x, y) + beyond)
+            out[row, column] = scale * (value_at(phi, x, y) + beyond)
 
 
 @part
-def _value(field: Float, x: float, y: float) -> float:
+def value_at(field: Float, x: float, y: float) -> float:
     """The bilinear value at a point, or at the point of the picture that is nearest to it."""
     height, width = field.shape
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.masks import disjoint, mask_overlaps, mask_shares
+from perdure.features.masks import mask_overlaps, mask_shares, silhouettes
 from perdure.maths import lie
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
@@ -410,7 +410,7 @@ class Contour:
         if marks is None and regions.blind:
             return targets, [], state.waiting, []
         targets = list(targets)
-        masks = [_mask_of(regions, row, state.size) for row in range(len(regions))]
+        masks = silhouettes(regions, *state.size)
         least = max(self.smallest * state.size[0] * state.size[1], 1)
         born: list[Target] = []
         waiting: list[Mask] = []
@@ -497,15 +497,6 @@ def _cell_of(width: int, height: int, ring: float, cells: int) -> int:
     while (width + 2 * ring) * (height + 2 * ring) > cells * step * step:
         step *= 2
     return step
-
-
-def _mask_of(regions: Regions, row: int, size: tuple[int, int]) -> Mask:
-    """The silhouette of a region inside a picture (height, width); its box where there is none."""
-    height, width = size
-    if regions.masks[row].area:
-        return disjoint([regions.masks[row]], height, width)[0]
-    x1, y1, x2, y2 = np.clip(np.rint(regions.boxes[row]), 0, (width, height, width, height)).astype(int).tolist()
-    return Mask(y1, x1, np.ones((y2 - y1, x2 - x1), np.bool_))
 
 
 def _marked_before(targets: list[Target], held: list[Mask], mask: Mask, identity: int) -> int | None:

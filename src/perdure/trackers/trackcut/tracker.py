@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.masks import disjoint
+from perdure.features.masks import silhouettes
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
 from perdure.trackers.trackcut.births import Nursery, births
@@ -101,7 +101,7 @@ class TrackCut:
         if frame.image is None:
             return replace(state, time=frame.time), Report()
         sight = look_at(frame.image)
-        observations = [_mask_of(regions, row, state.size) for row in range(len(regions))]
+        observations = silhouettes(regions, *state.size)
         targets = list(state.targets)
         events: list[Event] = []
         if state.grey.shape == sight.grey.shape and targets:
@@ -271,15 +271,6 @@ class TrackCut:
             for k, mask in zip(some, parts, strict=True):
                 masks[k] = mask
         return masks
-
-
-def _mask_of(regions: Regions, row: int, size: tuple[int, int]) -> Mask:
-    """The silhouette of an observation inside a picture (height, width); its box where there is none."""
-    height, width = size
-    if regions.masks[row].area:
-        return disjoint([regions.masks[row]], height, width)[0]
-    x1, y1, x2, y2 = np.clip(np.rint(regions.boxes[row]), 0, (width, height, width, height)).astype(int).tolist()
-    return Mask(y1, x1, np.ones((y2 - y1, x2 - x1), np.bool_))
 
 
 def _elsewhere(others: list[Mask], expected: Expected) -> Float:
