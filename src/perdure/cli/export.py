@@ -16,6 +16,7 @@ from perdure import params
 from perdure.cli import options
 from perdure.errors import FormatError, OutputError, ParameterError
 from perdure.files import mask_pngs
+from perdure.files.folders import refuse_existing_folder
 from perdure.files.log import read_log
 from perdure.files.mot import write_rows
 from perdure.files.mots import write_masks
@@ -98,7 +99,7 @@ def _refuse(output: Path, run: Path, format_: str, *, overwrite: bool) -> None:
     if output.resolve() in {(run / name).resolve() for name in ("run.json", "tracks.jsonl")}:
         raise OutputError(f"{output} is a part of the run itself; name another place with -o")
     if format_ == "mask-png":
-        mask_pngs.refuse_existing_folder(output, overwrite=overwrite)
+        refuse_existing_folder(output, mask_pngs.SUFFIX, overwrite=overwrite)
     else:
         refuse_existing(output, overwrite=overwrite)
 

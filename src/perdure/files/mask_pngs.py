@@ -6,8 +6,6 @@ void: pixels of a truth that belong to no object and cost nothing.
 
 from __future__ import annotations
 
-import contextlib
-import re
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
@@ -20,10 +18,11 @@ from numpy.typing import NDArray
 
 from perdure.errors import FormatError, OutputError
 from perdure.features.masks import disjoint
+from perdure.files.folders import is_number, whole_folder
 from perdure.files.images import natural_order
-from perdure.files.whole import cannot_write
 from perdure.types import Mask, Rows, Tracks, Use
 
+SUFFIX = ".png"
 VOID = 255  # of an 8-bit truth
 LARGEST_ID = 65_535
 
@@ -89,7 +88,7 @@ def pictures_in(folder: Path) -> list[tuple[int, Path]]:
     if not paths:
         raise FormatError(f"{folder} holds no PNG")
     paths.sort(key=natural_order)
-    if not all(_is_number(one.stem) for one in paths):
+    if not all(is_number(one.stem) for one in paths):
         return list(enumerate(paths))
     numbered = sorted((int(one.stem), one) for one in paths)
     for (frame, one), (following, other) in pairwise(numbered):
@@ -130,19 +129,13 @@ def write_masks(
     OutputError
         If the place cannot be written or is taken, if `largest_id` is above 65 535, or an id above that.
     """
-    refuse_existing_folder(folder, overwrite=overwrite)
     if largest_id > LARGEST_ID:
         raise OutputError(
             f"id {largest_id} is too large for a picture of 16 bits ({LARGEST_ID} at most); write MOTS text instead"
         )
-    folder = folder.resolve()
-    part = folder.with_name(f".{folder.name}.part")
     black = np.zeros((height, width), np.uint8 if largest_id < VOID else np.uint16)
     count, written = 0, set()
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        _remove(part)  # of an export that was killed
-        part.mkdir()
+    with whole_folder(folder, SUFFIX, overwrite=overwrite) as write:
         for frame, here in rows:
             if len(here) and int(here.ids.max()) > largest_id:
                 raise OutputError(
@@ -150,38 +143,11 @@ def write_masks(
                 )
             picture = black.copy()
             count += _paint(picture, here)
-            _write_picture(part, frame, picture)
+            write(frame, _encoded(picture))
             written.add(frame)
         for frame in set(frames) - written:
-            _write_picture(part, frame, black)
-        _give_place(part, folder)
-    except OSError as error:
-        raise cannot_write(folder, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            _remove(part)
+            write(frame, _encoded(black))
     return count
-
-
-def refuse_existing_folder(folder: Path, *, overwrite: bool) -> None:
-    """Refuse to write pictures over something else, or unasked over pictures.
-
-    Raises
-    ------
-    OutputError
-        If it is a file, holds anything but pictures named by their frames, or is not to be replaced.
-    """
-    try:
-        if folder.exists() and not folder.is_dir():
-            raise OutputError(f"{folder} is a file; name a folder with -o")
-        there = sorted(folder.iterdir()) if folder.is_dir() else []
-    except OSError as error:
-        raise cannot_write(folder, error) from error
-    others = [one.name for one in there if not _is_ours(one)]
-    if others:
-        raise OutputError(f"{folder} holds other files ({others[0]}); name a new folder with -o")
-    if there and not overwrite:
-        raise OutputError(f"{folder} holds pictures already; add --overwrite or name another folder with -o")
 
 
 def silhouettes(picture: Indices) -> Iterator[tuple[int, Mask]]:
@@ -275,43 +241,10 @@ def _paint(picture: Indices, rows: Tracks) -> int:
     return sum(mask.bits.size > 0 for mask in cut)
 
 
-def _write_picture(folder: Path, frame: int, picture: Indices) -> None:
+def _encoded(picture: Indices) -> bytes:
     import cv2
 
-    (folder / f"{frame:06d}.png").write_bytes(cv2.imencode(".png", picture)[1].tobytes())
-
-
-def _give_place(part: Path, folder: Path) -> None:
-    """Give a finished folder its name; what had it before goes, once that is done."""
-    if not folder.exists():
-        part.rename(folder)
-        return
-    old = folder.with_name(f".{folder.name}.old")
-    _remove(old)
-    folder.rename(old)
-    try:
-        part.rename(folder)
-    except BaseException:
-        old.rename(folder)
-        raise
-    _remove(old)
-
-
-def _remove(folder: Path) -> None:
-    """Remove a folder of ours; OSError where something else is in it."""
-    if folder.is_dir():
-        for one in folder.iterdir():
-            if _is_ours(one):
-                one.unlink()
-        folder.rmdir()
-
-
-def _is_ours(path: Path) -> bool:
-    return path.name == ".DS_Store" or (path.suffix == ".png" and len(path.stem) >= 6 and _is_number(path.stem))
-
-
-def _is_number(text: str) -> bool:
-    return re.fullmatch(r"[0-9]{1,9}", text) is not None
+    return cv2.imencode(".png", picture)[1].tobytes()
 
 
 _SIGNATURE, _HEADER = b"\x89PNG\r\n\x1a\n", 13  # bytes
