@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from perdure.online import Online
     from perdure.pipeline import follow, plan, track
     from perdure.states import load, save
-    from perdure.types import Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
+    from perdure.types import Event, Frame, Mask, Outline, Regions, Report, Scene, Status, Tracks
 
 _HOME = {
     "perdure.errors": [
@@ -44,7 +44,7 @@ _HOME = {
     "perdure.online": ["Online"],
     "perdure.pipeline": ["follow", "plan", "track"],
     "perdure.states": ["load", "save"],
-    "perdure.types": ["Event", "Frame", "Mask", "Regions", "Report", "Scene", "Status", "Tracks"],
+    "perdure.types": ["Event", "Frame", "Mask", "Outline", "Regions", "Report", "Scene", "Status", "Tracks"],
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
@@ -56,6 +56,7 @@ __all__ = [
     "Frame",
     "Mask",
     "Online",
+    "Outline",
     "OutputError",
     "ParameterError",
     "PerdureError",

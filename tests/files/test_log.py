@@ -9,7 +9,7 @@ import pytest
 
 from perdure.errors import FormatError
 from perdure.files.log import RunLog, read_log
-from perdure.types import Dropped, Event, Explanation, Ground, Mask, Renamed, Report, Status, Tracks
+from perdure.types import Dropped, Event, Explanation, Ground, Mask, Outline, Renamed, Report, Status, Tracks
 
 FULL = Report(
     rows=Tracks.of(
@@ -24,6 +24,7 @@ FULL = Report(
         inferred=[False, True],
         masks=[Mask(1, 2, np.eye(4, dtype=bool)), Mask.empty()],
         believed=[Mask(0, 0, np.ones((2, 2), bool)), None],
+        outlines=[Outline.of([[[-0.5, 1], [9.25, 1.5], [4, 7]], [[3, 2], [3, 3], [4, 2.5]]]), None],
         hidden_side=["left+top", ""],
         ground=[Ground(1.5, 2.5, 0.25), None],
         links=[(0, 2), ()],

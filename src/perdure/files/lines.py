@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from perdure.errors import FormatError
 from perdure.features.masks import of_run_lengths, run_lengths
 from perdure.files.span import shown
-from perdure.types import Mask
+from perdure.types import PER_PIXEL, Mask, Outline
 
 Json = Any
 _LONGEST_SIDE, _LARGEST_AREA = 1 << 15, 1 << 28  # px, of a silhouette
@@ -101,6 +101,30 @@ def mask_of_json(value: Json) -> Mask:
     if sum(runs) != height * width:
         raise ValueError(f"the mask's runs do not fill its size of {width}x{height}")
     return of_run_lengths(runs, *corner, height, width)
+
+
+def outline_to_json(outline: Outline) -> Json:
+    """Return a contour as its lines: a place in whole parts of a pixel, and the steps from each point to the next."""
+    rings = [np.rint(ring * PER_PIXEL).astype(np.int64) for ring in outline.rings]  # each (n, 2)
+    steps = [np.diff(ring, axis=0, prepend=0).ravel().tolist() for ring in rings]
+    return {"per_pixel": PER_PIXEL, "rings": steps}
+
+
+def outline_of_json(value: Json) -> Outline:
+    """Return the contour that `outline_to_json` wrote; ValueError if it is damaged."""
+    if not isinstance(value, Mapping) or not {"per_pixel", "rings"} <= value.keys():
+        raise ValueError("an outline must have per_pixel and rings")
+    parts, rings = value["per_pixel"], value["rings"]
+    if type(parts) is not int or not 1 <= parts <= PER_PIXEL or PER_PIXEL % parts:
+        raise ValueError(f"an outline's per_pixel must be a whole number that divides {PER_PIXEL}")
+    if not isinstance(rings, list) or not all(_are_whole(ring) for ring in rings):
+        raise ValueError("an outline's rings must be lists of whole numbers")
+    if any(len(ring) % 2 or len(ring) < 6 for ring in rings):
+        raise ValueError("an outline's ring must have two numbers a point, and three points or more")
+    if any(max(map(abs, ring)) > _FAR * parts for ring in rings):
+        raise ValueError(f"an outline's steps must be whole numbers up to {_FAR} pixels")
+    places = [np.cumsum(np.array(ring, np.int64).reshape(-1, 2), axis=0) for ring in rings]  # each (n, 2)
+    return Outline(tuple(place / parts for place in places))
 
 
 def _are_whole(values: Json) -> bool:

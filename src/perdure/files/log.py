@@ -11,7 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from perdure.errors import FormatError
-from perdure.files.lines import mask_of_json, mask_to_json, read_lines, short, short_row, to_line
+from perdure.files.lines import (
+    mask_of_json,
+    mask_to_json,
+    outline_of_json,
+    outline_to_json,
+    read_lines,
+    short,
+    short_row,
+    to_line,
+)
 from perdure.files.whole import cannot_write
 from perdure.types import Dropped, Event, Explanation, Ground, Mask, Renamed, Report, Status, Tracks
 
@@ -105,7 +114,7 @@ def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:
         row["frame"], row["time"] = int(rows.frames[i]), float(rows.times[i])
     row["status"] = Status(rows.status[i]).word
     row["confidence"] = short(rows.confidence[i])
-    believed, ground = rows.believed[i], rows.ground[i]
+    believed, outline, ground = rows.believed[i], rows.outlines[i], rows.ground[i]
     optional = {
         "class": str(rows.classes[i]),
         "group": int(rows.groups[i]),
@@ -114,6 +123,7 @@ def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:
         "links": list(rows.links[i]),
         "ground": None if ground is None else list(ground),
         "believed": None if believed is None else mask_to_json(believed),
+        "outline": None if outline is None else outline_to_json(outline),
         "mask": mask_to_json(rows.masks[i]) if rows.masks[i].bits.size else None,
     }
     return row | {key: value for key, value in optional.items() if value}
@@ -136,6 +146,7 @@ def _rows_of_json(rows: list[Json], frame: int, time: float, with_masks: bool) -
         links=[tuple(map(int, row.get("links", ()))) for row in rows],
         ground=[Ground(*map(float, row["ground"])) if "ground" in row else None for row in rows],
         believed=[mask_of_json(row["believed"]) if with_masks and "believed" in row else None for row in rows],
+        outlines=[outline_of_json(row["outline"]) if with_masks and "outline" in row else None for row in rows],
         masks=[mask_of_json(row["mask"]) if with_masks and "mask" in row else _NO_MASK for row in rows],
     )
 

@@ -1,11 +1,11 @@
-"""The nouns: Frame, Mask, Regions, Tracks, Event, Report, Scene, Status.
+"""The nouns: Frame, Mask, Outline, Regions, Tracks, Event, Report, Scene, Status.
 
 *Seen* is `Regions`, *believed* is a tracker's own state, *said* is `Tracks`: three words, three types.
 All are frozen, their arrays read-only. Boxes are (N, 4) float32 `x1 y1 x2 y2`, half-open, in pixels.
 """
 
 from perdure.types.arrays import Bits, Boxes, Image
-from perdure.types.frame import Frame, Mask
+from perdure.types.frame import PER_PIXEL, Frame, Mask, Outline
 from perdure.types.regions import Regions
 from perdure.types.report import Dropped, Event, Explanation, Renamed, Report
 from perdure.types.rows import Rows, Use
@@ -13,6 +13,7 @@ from perdure.types.scene import Scene
 from perdure.types.tracks import TRACK_COLUMNS, Ground, Status, Tracks
 
 __all__ = [
+    "PER_PIXEL",
     "TRACK_COLUMNS",
     "Bits",
     "Boxes",
@@ -23,6 +24,7 @@ __all__ = [
     "Ground",
     "Image",
     "Mask",
+    "Outline",
     "Regions",
     "Renamed",
     "Report",

@@ -1,10 +1,12 @@
-"""One picture of a source, and a silhouette in it."""
+"""One picture of a source, a silhouette in it, and a contour between its pixels."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from perdure.types.arrays import Bits, Image, frozen
 
@@ -93,6 +95,65 @@ class Mask:
         )
 
     __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The contour of a silhouette, between pixels: closed lines, whose first point is not said again at the end.
+
+    Pixel (0, 0) reaches from 0 to 1, as in boxes: its middle is at .5, .5. Outer lines run with the clock as one sees
+    them, y downwards, and holes against it, so that x dy - y dx is above 0 around what is inside. Places are kept to
+    1 / PER_PIXEL of a pixel.
+
+    >>> Outline.of([[[0, 0], [4, 0], [4, 2], [0, 2]]]).area
+    8.0
+    """
+
+    rings: tuple[NDArray[np.float64], ...]  # each (n, 2) x, y; n >= 3
+
+    def __post_init__(self) -> None:
+        kept = []
+        for ring in self.rings:
+            places = np.rint(np.asarray(ring, np.float64) * PER_PIXEL) / PER_PIXEL  # (n, 2)
+            if places.ndim != 2 or places.shape[1] != 2 or len(places) < 3 or not np.isfinite(places).all():
+                raise ValueError(
+                    f"a ring must be (n, 2) finite numbers of three points or more, not {places.shape}"
+                )
+            kept.append(frozen(places + 0.0))  # no -0
+        object.__setattr__(self, "rings", tuple(kept))
+
+    @staticmethod
+    def of(rings: Iterable[ArrayLike]) -> Outline:
+        """Return the outline of closed lines (n, 2); what is no area when places are kept is left out."""
+        kept = []
+        for ring in rings:
+            places = np.rint(np.asarray(ring, np.float64) * PER_PIXEL) / PER_PIXEL
+            places = places[(places != np.roll(places, 1, axis=0)).any(axis=1)]  # no point twice in a row
+            if len(places) >= 3 and _signed_area(places):
+                kept.append(places)
+        return Outline(tuple(kept))
+
+    @property
+    def area(self) -> float:
+        """Square pixels inside."""
+        return sum(_signed_area(ring) for ring in self.rings)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Outline)
+            and len(self.rings) == len(other.rings)
+            and all(np.array_equal(one, two) for one, two in zip(self.rings, other.rings, strict=True))
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+PER_PIXEL = 64  # places of an outline
+
+
+def _signed_area(ring: NDArray[np.float64]) -> float:
+    x, y = ring.T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
 _NOTHING = Mask(0, 0, np.zeros((0, 0), np.bool_))

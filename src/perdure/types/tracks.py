@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from perdure.errors import PerdureError
 from perdure.types.arrays import Boxes, as_boxes, check_lengths, frozen, row_index, same_columns
-from perdure.types.frame import Mask
+from perdure.types.frame import Mask, Outline
 
 if TYPE_CHECKING:
     import pandas
@@ -67,6 +67,8 @@ class Tracks:
         The pixels seen: disjoint within a frame; empty where nothing is seen.
     believed : N of Mask or None
         The whole silhouette, hidden parts included, where the tracker has one.
+    outlines : N of Outline or None
+        The contour of that silhouette between pixels, where the tracker has one.
     hidden_side : (N,) str
         'left', 'top', 'right', 'bottom', several joined by '+', or empty.
     ground : N of Ground or None
@@ -86,6 +88,7 @@ class Tracks:
     inferred: NDArray[np.bool_]
     masks: tuple[Mask, ...]
     believed: tuple[Mask | None, ...]
+    outlines: tuple[Outline | None, ...]
     hidden_side: NDArray[np.str_]
     ground: tuple[Ground | None, ...]
     links: tuple[tuple[int, ...], ...]
@@ -95,7 +98,7 @@ class Tracks:
         columns["boxes"] = as_boxes(self.boxes)
         for name, dtype in _TRACK_DTYPES.items():
             columns[name] = frozen(np.asarray(columns[name], dtype))
-        for name in ("masks", "believed", "ground", "links"):
+        for name in ("masks", "believed", "outlines", "ground", "links"):
             columns[name] = tuple(columns[name])
         check_lengths(len(self.boxes), columns)
 
@@ -113,6 +116,7 @@ class Tracks:
         inferred: ArrayLike | None = None,
         masks: Sequence[Mask] | None = None,
         believed: Sequence[Mask | None] | None = None,
+        outlines: Sequence[Outline | None] | None = None,
         hidden_side: ArrayLike | None = None,
         ground: Sequence[Ground | None] | None = None,
         links: Sequence[tuple[int, ...]] | None = None,
@@ -141,6 +145,7 @@ class Tracks:
             inferred=column(inferred, False, np.bool_),
             masks=(Mask.empty(),) * count if masks is None else tuple(masks),
             believed=(None,) * count if believed is None else tuple(believed),
+            outlines=(None,) * count if outlines is None else tuple(outlines),
             hidden_side=column(hidden_side, "", np.str_),
             ground=(None,) * count if ground is None else tuple(ground),
             links=((),) * count if links is None else tuple(links),

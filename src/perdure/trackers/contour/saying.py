@@ -7,15 +7,25 @@ from collections.abc import Sequence
 import numpy as np
 
 from perdure.features.masks import disjoint, holding
+from perdure.features.outlines import thinned
+from perdure.maths import levelset, lie
+from perdure.trackers.contour import observer
 from perdure.trackers.contour.targets import Target
-from perdure.types import Event, Frame, Mask, Status, Tracks
+from perdure.types import Event, Frame, Mask, Outline, Status, Tracks
 
 PARTLY = 0.75  # share of a silhouette that is seen, below which it is partly occluded
 UNSEEN = 0.45  # confidence, at most, of an object that is not seen
+_OFF = 0.05  # pixels from the contour, at most, of one with fewer points
+_MIDDLE = 0.5  # of a pixel, which reaches from 0 to 1 in what is said
 
 
 def rows_of(
-    targets: Sequence[Target], believed: Sequence[Mask], frame: Frame, size: tuple[int, int], patience: float
+    targets: Sequence[Target],
+    believed: Sequence[Mask],
+    frame: Frame,
+    size: tuple[int, int],
+    patience: float,
+    group: lie.Group,
 ) -> Tracks:
     """Return the rows of a frame; believed are whole silhouettes, which may leave the picture (height, width)."""
     if not targets:
@@ -42,8 +52,17 @@ def rows_of(
         inferred=hidden,
         masks=masks,
         believed=believed,
+        outlines=[outline_of(one.state, group) for one in targets],
         links=[one.links for one in targets],
     )
+
+
+def outline_of(state: observer.State, group: lie.Group) -> Outline:
+    """Return the contour g ∂μ between pixels: marching squares on μ, carried by g."""
+    pose = observer.pose_of(state, group)
+    middle = (np.array(state.shape.shape[::-1]) - 1) / 2  # (2,) x, y of μ's origin
+    lines = [lie.act(pose, line - middle) + _MIDDLE for line in levelset.contour(state.shape)]
+    return Outline.of(thinned(line, _OFF) for line in lines)
 
 
 def _status(target: Target, mask: Mask) -> Status:

@@ -151,7 +151,7 @@ class Contour:
             else:
                 kept.append(one)
                 believed.append(whole)
-        rows = rows_of(kept, believed, frame, state.size, self.patience)
+        rows = rows_of(kept, believed, frame, state.size, self.patience, self._group)
         events += happenings(state.targets, kept, frame)
         next_id = max([state.next_id, *(one.id + 1 for one in born)])
         after = ContourState(
