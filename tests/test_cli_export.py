@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 from collections.abc import Callable
@@ -11,6 +12,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import pytest
+from shapely import from_wkt
+from shapely.geometry import MultiPolygon, Polygon, shape
 from worlds import two_apart
 
 from perdure.cli.main import run as run_command
@@ -18,7 +21,7 @@ from perdure.files import mask_pngs, mots
 from perdure.files.log import RunLog, read_log
 from perdure.files.runs import RunFolder
 from perdure.fold import settle
-from perdure.types import Mask, Renamed, Report, Rows, Status, Tracks
+from perdure.types import Mask, Outline, Renamed, Report, Rows, Status, Tracks
 
 HEIGHT, WIDTH = 30, 40
 
@@ -191,3 +194,185 @@ def test_silhouettes_that_track_and_cut_found_come_back_from_both_formats(
     }
     assert np.array_equal(first[3], reds)
     assert np.array_equal(first[1], blues)
+
+
+# Contours between pixels
+
+
+def round_of(x: float, y: float, radius: float, points: int = 60) -> np.ndarray:
+    angle = np.linspace(0, 2 * np.pi, points, endpoint=False)
+    return np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1)
+
+
+RING = Outline.of([round_of(15.3, 14.8, 9), round_of(15.3, 14.8, 4)[::-1], round_of(33.25, 8, 5)])
+
+
+@pytest.fixture
+def contours(tmp_path: Path) -> Path:
+    """A contour with a hole and two parts; pixels seen and more believed; a box; a row that is nowhere."""
+    rows = Tracks.of(
+        frames=4,
+        times=0.16,
+        ids=[1, 2, 3, 4],
+        boxes=[[3, 2, 40, 24], [0, 0, 20, 20], [1.5, 2, 8, 9], [5, 5, 5, 5]],
+        status=[Status.PARTLY_OCCLUDED, Status.VISIBLE, Status.VISIBLE, Status.VISIBLE],
+        classes=['<dog & "cat">', "", "", ""],
+        masks=[disc(10, 4), disc(20, 6), Mask.empty(), Mask.empty()],
+        believed=[disc(15, 9), disc(20, 9), None, None],
+        outlines=[RING, None, None, None],
+    )
+    return write_run(tmp_path / "run", {2: Report(), 4: Report(rows), -1: Report()})
+
+
+def features(path: Path) -> dict[int, dict]:
+    told = json.loads(path.read_text(encoding="utf-8"))
+    assert told["type"] == "FeatureCollection"
+    assert (told["picture"]["height"], told["picture"]["width"]) == (HEIGHT, WIDTH)
+    return {one["properties"]["id"]: one for one in told["features"]}
+
+
+def test_geojson_holds_contours_between_pixels_with_their_holes_and_parts(
+    export: Callable[..., Done], contours: Path, tmp_path: Path
+):
+    done = export("run", "--format", "geojson", "-o", "out.geojson", "--json")
+    assert json.loads(done.stdout) == {"output": "out.geojson", "rows": 3}
+    assert "without a silhouette: 1" in done.stderr
+    found = features(tmp_path / "out.geojson")
+    first = shape(found[1]["geometry"])
+    assert first.is_valid
+    assert sorted(len(one.interiors) for one in first.geoms) == [0, 1]
+    assert first.area == pytest.approx(RING.area, abs=0.01)
+    assert {name: found[1]["properties"][name] for name in ("frame", "class", "status", "outline")} == {
+        "frame": 4, "class": '<dog & "cat">', "status": "partly_occluded", "outline": "contour",
+    }  # fmt: skip
+    assert found[1]["properties"]["visibility"] == pytest.approx(disc(10, 4).area / disc(15, 9).area, abs=1e-4)
+    for outer in (one.exterior for one in first.geoms):
+        assert outer.is_ccw  # as RFC 7946 wants it, in numbers
+
+
+def test_a_row_without_a_contour_has_the_outline_of_its_pixels_or_its_box(
+    export: Callable[..., Done], contours: Path, tmp_path: Path
+):
+    export("run", "--format", "geojson", "-o", "out")
+    export("run", "--format", "geojson", "-o", "whole", "--believed")
+    seen, whole = features(tmp_path / "out"), features(tmp_path / "whole")
+    assert [seen[one]["properties"]["outline"] for one in (1, 2, 3)] == ["contour", "seen", "box"]
+    assert [whole[one]["properties"]["outline"] for one in (1, 2, 3)] == ["contour", "believed", "box"]
+    assert shape(seen[2]["geometry"]).area == disc(20, 6).area
+    assert shape(whole[2]["geometry"]).bounds == disc(20, 9).box
+    assert shape(seen[3]["geometry"]).bounds == (1.5, 2, 8, 9)
+
+
+def test_points_and_well_known_text_say_the_same(export: Callable[..., Done], contours: Path, tmp_path: Path):
+    assert export("run", "--format", "contour-csv", "-o", "points.csv").code == 0
+    assert export("run", "--format", "csv", "-o", "rows.csv").code == 0
+    rings: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    with (tmp_path / "points.csv").open(newline="") as file:
+        for line in csv.DictReader(file):
+            assert line["frame"] == "4"
+            if line["id"] == "1":
+                ring = rings.setdefault((int(line["part"]), int(line["ring"])), [])
+                assert int(line["point"]) == len(ring)
+                ring.append((float(line["x"]), float(line["y"])))
+    assert sorted(rings) == [(0, 0), (0, 1), (1, 0)]
+    built = MultiPolygon([Polygon(rings[0, 0], [rings[0, 1]]), Polygon(rings[1, 0])])
+    with (tmp_path / "rows.csv").open(newline="") as file:
+        told = {line["id"]: line for line in csv.DictReader(file)}
+    assert from_wkt(told["1"]["contour"]).symmetric_difference(built).area < 0.05
+    assert [told[one]["contour"] for one in ("2", "3", "4")] == [""] * 3
+    assert float(told["2"]["visibility"]) == pytest.approx(disc(20, 6).area / disc(20, 9).area, abs=1e-3)
+
+
+def test_svg_is_a_drawing_a_frame_and_what_is_not_seen_is_dashed(
+    export: Callable[..., Done], contours: Path, tmp_path: Path
+):
+    from xml.etree import ElementTree
+
+    done = export("run", "--format", "svg", "-o", "out", "--json")
+    assert json.loads(done.stdout) == {"output": "out", "rows": 3, "frames": 2}
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["000002.svg", "000004.svg"]
+    picture = ElementTree.parse(tmp_path / "out/000004.svg").getroot()
+    assert picture.get("viewBox") == f"0 0 {WIDTH} {HEIGHT}"
+    groups = {one.get("id"): one for one in picture.iter() if one.tag.endswith("}g")}
+    drawn = {
+        name: [(path.get("class"), path.get("stroke-dasharray") is not None) for path in group if path.get("d")]
+        for name, group in groups.items()
+    }
+    assert drawn["target-1"] == [("whole", False), ("seen", False), ("believed", True)]
+    assert drawn["target-2"] == drawn["target-3"] == [("whole", False), ("seen", False)]
+    assert export("run", "--format", "svg", "-o", "out").code == 2
+    assert export("run", "--format", "svg", "-o", "out", "--overwrite").code == 0
+    assert export("run", "--format", "svg", "-o", "run", "--overwrite").code == 2
+
+
+def test_believed_silhouettes_instead_of_the_pixels_seen(
+    export: Callable[..., Done], contours: Path, tmp_path: Path
+):
+    assert export("run", "--format", "mots", "-o", "out.txt", "--believed").code == 0
+    rows = mots.read_masks(tmp_path / "out.txt")
+    assert [(int(one), mask) for one, mask in zip(rows.ids, rows.masks, strict=True)] == [
+        (1, disc(15, 9)),
+        (2, disc(20, 9)),
+    ]
+    assert export("run", "--format", "mask-png", "-o", "out", "--believed").code == 0
+    assert mask_pngs.read_masks(tmp_path / "out", void=True).masks[0] == disc(15, 9)
+    refused = export("run", "--format", "mot", "-o", "boxes.txt", "--believed")
+    assert (refused.code, "--believed" in refused.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("form", ["geojson", "contour-csv", "svg"])
+def test_contours_appear_whole_or_not_at_all(
+    export: Callable[..., Done], contours: Path, tmp_path: Path, form: str
+):
+    log = contours / "tracks.jsonl"
+    log.write_text(log.read_text().replace('"per_pixel":64', '"per_pixel":63'))
+    refused = export("run", "--format", form, "-o", "out")
+    assert (refused.code, "line 3: not a report (an outline's per_pixel" in refused.stderr) == (2, True)
+    (tmp_path / "file").write_text("precious")
+    for place in ("file/out", "file"):
+        assert export("run", "--format", form, "-o", place).code == 2
+    assert (tmp_path / "file").read_text() == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "run"]
+    assert export("nowhere", "--format", form, "-o", "out").code == 2
+
+
+def test_the_contour_of_a_disc_comes_back_between_pixels(
+    export: Callable[..., Done], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "film").mkdir()
+    y, x = np.mgrid[:96, :128] + 0.5
+    middles = [(45.3 + 1.37 * frame, 48.6 - 0.45 * frame) for frame in range(8)]
+    rough = np.random.default_rng(0).integers(0, 60, (96, 128, 3), np.uint8)
+    for frame, middle in enumerate(middles):
+        inside = np.hypot(x - middle[0], y - middle[1]) < 20.75
+        cv2.imwrite(
+            f"film/{frame:03d}.png",
+            np.where(inside[..., None], (40, 50, 190), rough + (60 + 60 * (np.arange(3) == 1))),
+        )
+        if not frame:
+            cv2.imwrite("mark.png", np.uint8(inside))
+    words = [
+        "track",
+        "film",
+        "-o",
+        "run",
+        "--init",
+        "mark.png",
+        "--tracker",
+        "contour",
+        "--no-video",
+        "--fps",
+        "25",
+    ]
+    monkeypatch.setattr(sys, "argv", ["perdure", *words])
+    assert run_command() == 0
+    assert export("run", "--format", "geojson", "-o", "out.geojson").code == 0
+    told = json.loads((tmp_path / "out.geojson").read_text())["features"]
+    said = settle(entry.report for entry in read_log(tmp_path / "run/tracks.jsonl"))
+    assert [one["properties"]["frame"] for one in told] == list(range(8))
+    for frame, one in enumerate(told):
+        found = shape(one["geometry"])
+        assert found.is_valid
+        assert np.hypot(found.centroid.x - middles[frame][0], found.centroid.y - middles[frame][1]) < 0.15
+        assert found.area == pytest.approx(said.believed[frame].area, rel=0.02)
+    assert np.sqrt(shape(told[0]["geometry"]).area / np.pi) == pytest.approx(20.75, abs=0.15)

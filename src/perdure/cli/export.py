@@ -6,7 +6,6 @@ import csv
 import json
 import sys
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import IO, Annotated, NamedTuple, cast
 
@@ -16,14 +15,23 @@ from perdure import params
 from perdure.cli import options
 from perdure.errors import FormatError, OutputError, ParameterError
 from perdure.files import mask_pngs
-from perdure.files.folders import refuse_existing_folder
+from perdure.files.contours import (
+    POINT_COLUMNS,
+    contours_of,
+    wkt_of,
+    write_features,
+    write_geojson_begin,
+    write_geojson_end,
+    write_points,
+)
+from perdure.files.folders import refuse_existing_folder, whole_folder
 from perdure.files.log import read_log
 from perdure.files.mot import write_rows
 from perdure.files.mots import write_masks
 from perdure.files.runs import Reporting, RunFolder
 from perdure.files.whole import refuse_existing, whole_file
 from perdure.fold import Corrections, settle_with
-from perdure.types import Report, Status, Tracks
+from perdure.types import Status, Tracks
 
 CSV_COLUMNS = (
     "frame",
@@ -39,8 +47,12 @@ CSV_COLUMNS = (
     "group",
     "inferred",
     "hidden_side",
+    "visibility",
+    "contour",
 )
-FORMATS = ("csv", "mot", "mots", "mask-png")
+FORMATS = ("csv", "mot", "mots", "mask-png", "geojson", "contour-csv", "svg")
+FOLDERS = {"mask-png": mask_pngs.SUFFIX, "svg": ".svg"}  # of one file a frame, with this suffix
+OF_BOXES = ("csv", "mot")
 
 
 @options.with_parameters(("", {"What counts": Reporting}))
@@ -51,7 +63,11 @@ def export(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="The file to write; a folder for mask-png.", show_default=False
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="The file to write; a folder for mask-png and svg.",
+            show_default=False,
         ),
     ],
     chosen: dict[str, object],
@@ -60,22 +76,36 @@ def export(
         typer.Option(
             "--format",
             help="mot: MOTChallenge text, frames and pixels from 1; csv: all plain columns, frames and pixels from 0; "
-            "mots: MOTS text, silhouettes, frames from 1; mask-png: a folder with a picture a frame, pixel = id.",
+            "mots: MOTS text, silhouettes, frames from 1; mask-png: a folder with a picture a frame, pixel = id; "
+            "contours between pixels: geojson: polygons with holes; contour-csv: a line a point; svg: a folder with a "
+            "drawing a frame, dashed where not seen.",
         ),
     ] = "mot",
+    believed: Annotated[
+        bool,
+        typer.Option(
+            "--believed", help="Whole silhouettes, as far as one is believed, instead of the pixels seen."
+        ),
+    ] = False,
     overwrite: options.OverwriteOption = False,
     json_: options.JsonOption = False,
 ) -> None:
     """Write the rows of RUN that count in another format."""
     if format_ not in FORMATS:
         raise ParameterError(params.unknown_name("format", format_, FORMATS))
+    if believed and format_ in OF_BOXES:
+        raise ParameterError(
+            f"--believed does not go with --format {format_}: what it says is of the whole already"
+        )
     _refuse(output, run, format_, overwrite=overwrite)
     folder = RunFolder.open(run)
     reporting = params.build(Reporting, {**folder.read_about().get("reporting", {}), **chosen})
     if format_ == "mask-png":
-        written = _write_pictures(output, folder, reporting, overwrite=overwrite)
+        written = _write_pictures(output, folder, reporting, believed=believed, overwrite=overwrite)
+    elif format_ == "svg":
+        written = _write_drawings(output, folder, reporting, believed=believed, overwrite=overwrite)
     else:
-        written = _write_text(output, folder, reporting, format_)
+        written = _write_text(output, folder, reporting, format_, believed=believed)
     if written.left_out:
         print(f"perdure: note: rows left out, without a silhouette: {written.left_out}", file=sys.stderr)
     if json_:
@@ -98,8 +128,8 @@ def _refuse(output: Path, run: Path, format_: str, *, overwrite: bool) -> None:
     """Refuse to write over what is there, unless that is asked; over what the run rests on, never."""
     if output.resolve() in {(run / name).resolve() for name in ("run.json", "tracks.jsonl")}:
         raise OutputError(f"{output} is a part of the run itself; name another place with -o")
-    if format_ == "mask-png":
-        refuse_existing_folder(output, mask_pngs.SUFFIX, overwrite=overwrite)
+    if format_ in FOLDERS:
+        refuse_existing_folder(output, FOLDERS[format_], overwrite=overwrite)
     else:
         refuse_existing(output, overwrite=overwrite)
 
@@ -110,43 +140,81 @@ def _counted(folder: RunFolder, reporting: Reporting) -> Iterator[tuple[int, Tra
         yield frame, settled.counted(reporting.report_confidence)
 
 
-def _write_text(output: Path, folder: RunFolder, reporting: Reporting, format_: str) -> _Written:
-    """Write a file of one line a row."""
-    writers: dict[str, Callable[[IO[str], Tracks], int]] = {"csv": _write_csv, "mot": _write_mot}
-    if format_ == "mots":
-        height, width = _size(folder)
-        writers["mots"] = partial(write_masks, height=height, width=width)
-    counted = written = 0
+def _write_text(
+    output: Path, folder: RunFolder, reporting: Reporting, format_: str, *, believed: bool
+) -> _Written:
+    """Write one file."""
+    writers: dict[str, Callable[[IO[str], RunFolder, Iterator[Tracks], bool], int]] = {
+        "csv": _write_csv,
+        "mot": _write_mot,
+        "mots": _write_mots,
+        "geojson": _write_geojson,
+        "contour-csv": _write_points,
+    }
+    counted = 0
+
+    def rows() -> Iterator[Tracks]:
+        nonlocal counted
+        for _, here in _counted(folder, reporting):
+            counted += len(here)
+            yield here
+
     with whole_file(output) as file:
-        if format_ == "csv":
-            csv.writer(file, lineterminator="\n").writerow(CSV_COLUMNS)
-        for _, rows in _counted(folder, reporting):
-            counted += len(rows)
-            written += writers[format_](file, rows)
+        written = writers[format_](file, folder, rows(), believed)
     return _Written(written, counted - written)
 
 
-def _write_pictures(output: Path, folder: RunFolder, reporting: Reporting, *, overwrite: bool) -> _Written:
+def _write_pictures(
+    output: Path, folder: RunFolder, reporting: Reporting, *, believed: bool, overwrite: bool
+) -> _Written:
     """Write a folder with a picture for each frame of the run."""
-    frames: list[int] = []
-
-    def reports() -> Iterator[Report]:
-        for entry in read_log(folder.log, with_masks=False):
-            if entry.frame >= 0:  # the finishing entry has no frame
-                frames.append(entry.frame)
-            yield entry.report
-
     height, width = _size(folder)
-    corrections = Corrections.of(reports())
+    frames = _frames_of(folder)
+    corrections = Corrections.of(one.report for one in read_log(folder.log, with_masks=False))
     counted = largest = 0
     for _, settled in settle_with(corrections, (one.report for one in read_log(folder.log, with_masks=False))):
         rows = settled.counted(reporting.report_confidence)
         counted += len(rows)
         largest = max(largest, *rows.ids.tolist(), 0)
+    pictures = ((frame, _as_asked(rows, believed)) for frame, rows in _counted(folder, reporting))
     written = mask_pngs.write_masks(
-        output, _counted(folder, reporting), frames, height, width, largest_id=largest, overwrite=overwrite
+        output, pictures, frames, height, width, largest_id=largest, overwrite=overwrite
     )
     return _Written(written, counted - written, len(frames))
+
+
+def _write_drawings(
+    output: Path, folder: RunFolder, reporting: Reporting, *, believed: bool, overwrite: bool
+) -> _Written:
+    """Write a folder with an SVG for each frame of the run."""
+    from perdure.draw.svg import svg_of
+
+    height, width = _size(folder)
+    frames = _frames_of(folder)
+    counted = written = 0
+    drawn: set[int] = set()
+    with whole_folder(output, FOLDERS["svg"], overwrite=overwrite) as write:
+        for frame, rows in _counted(folder, reporting):
+            found = [(one.row, one.outline, one.of == "contour") for one in contours_of(rows, believed=believed)]
+            write(frame, svg_of(rows, found, frame, height, width).encode())
+            counted, written = counted + len(rows), written + len(found)
+            drawn.add(frame)
+        for frame in set(frames) - drawn:
+            write(frame, svg_of(Tracks.empty(), (), frame, height, width).encode())
+    return _Written(written, counted - written, len(frames))
+
+
+def _frames_of(folder: RunFolder) -> list[int]:
+    """The frames of a run, also those in which nothing is said."""
+    return [entry.frame for entry in read_log(folder.log, with_masks=False) if entry.frame >= 0]
+
+
+def _as_asked(rows: Tracks, believed: bool) -> Tracks:
+    """The rows with the silhouettes that are asked for as their masks."""
+    if not believed:
+        return rows
+    whole = (mask if one is None else one for one, mask in zip(rows.believed, rows.masks, strict=True))
+    return rows.replace(masks=tuple(whole))
 
 
 def _size(folder: RunFolder) -> tuple[int, int]:
@@ -160,29 +228,59 @@ def _size(folder: RunFolder) -> tuple[int, int]:
     return cast("tuple[int, int]", size)
 
 
-def _write_mot(file: IO[str], rows: Tracks) -> int:
-    write_rows(file, rows)
-    return len(rows)
+def _write_mot(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
+    count = 0
+    for rows in frames:
+        write_rows(file, rows)
+        count += len(rows)
+    return count
 
 
-def _write_csv(file: IO[str], rows: Tracks) -> int:
-    table = csv.writer(file, lineterminator="\n")
+def _write_mots(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
+    height, width = _size(folder)
+    return sum(write_masks(file, _as_asked(rows, believed), height, width) for rows in frames)
+
+
+def _write_geojson(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
+    count = 0
+    write_geojson_begin(file, *_size(folder))
+    for rows in frames:
+        count += write_features(file, rows, believed=believed, first=not count)
+    write_geojson_end(file)
+    return count
+
+
+def _write_points(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
+    csv.writer(file, lineterminator="\n").writerow(POINT_COLUMNS)
+    return sum(write_points(file, rows, believed=believed) for rows in frames)
+
+
+def _write_csv(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
+    table, count = csv.writer(file, lineterminator="\n"), 0
+    table.writerow(CSV_COLUMNS)
+    for rows in frames:
+        table.writerows(_csv_lines(rows))
+        count += len(rows)
+    return count
+
+
+def _csv_lines(rows: Tracks) -> Iterator[list[object]]:
+    visibility = rows.visibility
     for i in range(len(rows)):
-        table.writerow(
-            [
-                rows.frames[i],
-                f"{rows.times[i]:.3f}",
-                rows.ids[i],
-                *(f"{side:.2f}" for side in rows.boxes[i]),
-                Status(rows.status[i]).word,
-                f"{rows.confidence[i]:.4g}",
-                rows.classes[i],
-                rows.groups[i],
-                int(rows.inferred[i]),
-                rows.hidden_side[i],
-            ]
-        )
-    return len(rows)
+        yield [
+            rows.frames[i],
+            f"{rows.times[i]:.3f}",
+            rows.ids[i],
+            *(f"{side:.2f}" for side in rows.boxes[i]),
+            Status(rows.status[i]).word,
+            f"{rows.confidence[i]:.4g}",
+            rows.classes[i],
+            rows.groups[i],
+            int(rows.inferred[i]),
+            rows.hidden_side[i],
+            f"{visibility[i]:.4g}",
+            wkt_of(rows.outlines[i]),
+        ]
 
 
 _LONGEST_SIDE = 1 << 16  # px
