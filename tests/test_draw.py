@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from perdure.draw import Trails, colour_of, paint
-from perdure.types import Frame, Mask, Scene, Status, Tracks
+from perdure.types import Frame, Mask, Outline, Scene, Status, Tracks
 
 SCENE = Scene(160, 120)
 
@@ -291,3 +291,28 @@ def test_painting_warns_of_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         paint(Frame(0, 0.0, ground(0)), rows_of([[1, 1, 30, 30]]), Trails.empty(), SCENE)
+
+
+def test_a_contour_is_solid_where_it_is_seen_and_dashed_where_it_is_believed():
+    scene = Scene(320, 240)
+    outline = Outline.of([[[30, 30], [290, 30], [290, 200], [30, 200]]])
+    seen = Mask(30, 30, np.ones((170, 100), bool))
+    rows = rows_of([[30, 30, 130, 200]], masks=[seen], outlines=[outline])
+    picture = paint(Frame(0, 0.0, ground(128, 320, 240)), rows, Trails.empty(), scene)
+
+    def coloured(part: np.ndarray, along: int) -> np.ndarray:
+        return (np.abs(part.astype(int) - colour_of(1)).max(axis=2) < 40).any(axis=1 - along)
+
+    assert coloured(picture[198:202, 40:120], 1).all()
+    dashed = coloured(picture[40:190, 287:292], 0)
+    assert 0.3 < dashed.mean() < 0.8
+    assert np.diff(np.flatnonzero(dashed)).max() < 12
+    assert not changed(picture, 128)[40:190, 140:280].any()  # nothing inside
+
+
+def test_a_contour_of_which_nothing_is_seen_is_dashed_all_round_and_may_leave_the_picture():
+    outline = Outline.of([[[-40, 20], [60, 20], [60, 90], [-40, 90]], [[900, 0], [990, 0], [990, 90]]])
+    rows = rows_of([[-40, 20, 60, 90]], status=[Status.OCCLUDED], outlines=[outline])
+    picture = paint(Frame(0, 0.0, ground(128)), rows, Trails.empty(), SCENE)
+    hidden = paint(Frame(0, 0.0, ground(128)), rows, Trails.empty(), SCENE, masks=False)
+    assert (picture != hidden).any()

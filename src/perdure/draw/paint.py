@@ -11,6 +11,8 @@ AMBIGUOUS          dotted, the id with a '?'
 a group            corner brackets around it and its members' ids
 =================  ==========================================================================
 
+A contour between pixels is solid where it is seen, and dashed where it is only believed.
+
 Boxes and trails lie on a translucent dark band, so that they read on light and on dark scenes. Widths and
 letters grow with the picture's height. Nothing here opens a file, and the same input gives the same picture.
 """
@@ -27,8 +29,9 @@ from numpy.typing import NDArray
 from perdure.draw.colours import Colour, colour_of, dimmer
 from perdure.draw.labels import Label, lay_labels
 from perdure.draw.marks import LEGEND, Mark, mark_labels, mark_strokes
-from perdure.draw.strokes import Lines, Stroke, Style, brackets, broken, whole
+from perdure.draw.strokes import SHIFT, Lines, Stroke, Style, between_pixels, brackets, broken, whole
 from perdure.draw.trails import Trails, draw_trails
+from perdure.features.outlines import seen_and_hidden
 from perdure.types import Frame, Image, Mask, Scene, Status, Tracks
 
 _CANVAS: Colour = (30, 33, 40)
@@ -71,15 +74,16 @@ def paint(
     seen = rows.take(_inside(rows, height, width))
     looks = _looks(seen, style)
     silhouettes = _silhouettes(seen, looks, style, height, width) if masks else []
+    dashed = _believed_contours(seen, looks, style, height, width) if masks else []
     if masks:
         _fill_masks(picture, seen)
     if frame.image is None:
         _fill_boxes(picture, seen)
     draw_trails(picture, trails, frame.time, style.line, style.halo)
     boxes = [_box_stroke(box, look, style) for box, look in zip(seen.boxes, looks, strict=True)]
-    _darken_beneath(picture, boxes, style)
-    for stroke in silhouettes:
-        cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width, cv2.LINE_AA)
+    _darken_beneath(picture, [*boxes, *dashed], style)
+    for stroke in (*silhouettes, *dashed):
+        cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width, cv2.LINE_AA, stroke.shift)
     for stroke in boxes:  # upright lines are crisp without anti-aliasing
         cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width)
     for stroke in mark_strokes(marks or (), style):
@@ -188,6 +192,11 @@ def _silhouettes(rows: Tracks, looks: Sequence[_Look], style: Style, height: int
     """Outlines of what is seen, and dotted ones of what is believed where part of it is hidden."""
     strokes = []
     for i, look in enumerate(looks):
+        outline = rows.outlines[i]
+        if outline is not None:
+            lines = _within(seen_and_hidden(outline, rows.masks[i]).seen, height, width)
+            strokes.append(Stroke([between_pixels(line) for line in lines], look.colour, style.thin, SHIFT))
+            continue
         seen = _outlines(rows.masks[i], height, width)
         if seen:
             strokes.append(Stroke(seen, look.colour, style.thin))
@@ -196,6 +205,25 @@ def _silhouettes(rows: Tracks, looks: Sequence[_Look], style: Style, height: int
             dots = [part for line in _outlines(whole, height, width) for part in broken(line, 2.0, style.dash / 2)]
             strokes.append(Stroke(dots, dimmer(look.colour), style.thin))
     return strokes
+
+
+def _believed_contours(
+    rows: Tracks, looks: Sequence[_Look], style: Style, height: int, width: int
+) -> list[Stroke]:
+    """Dashed lines of contours where they are not seen."""
+    strokes = []
+    dash, gap = ((1 << SHIFT) * style.dash * share for share in (0.75, 0.75))
+    for outline, mask, look in zip(rows.outlines, rows.masks, looks, strict=True):
+        if outline is not None:
+            hidden = _within(seen_and_hidden(outline, mask).hidden, height, width)
+            dashes = [part for line in hidden for part in broken(between_pixels(line), dash, gap)]
+            strokes.append(Stroke(dashes, look.colour, style.line, SHIFT))
+    return strokes
+
+
+def _within(lines: Sequence[NDArray[np.float64]], height: int, width: int) -> list[NDArray[np.float64]]:
+    """The lines that reach into the picture."""
+    return [line for line in lines if (line.max(axis=0) > 0).all() and (line.min(axis=0) < (width, height)).all()]
 
 
 def _outlines(mask: Mask, height: int, width: int) -> Lines:
@@ -236,7 +264,7 @@ def _darken_beneath(picture: Image, strokes: Sequence[Stroke], style: Style) -> 
     """Lay the dark band under all lines at once."""
     band = np.zeros(picture.shape[:2], np.uint8)
     for stroke in strokes:
-        cv2.polylines(band, stroke.lines, False, 255, stroke.width + style.halo)
+        cv2.polylines(band, stroke.lines, False, 255, stroke.width + style.halo, cv2.LINE_8, stroke.shift)
     cv2.copyTo(cv2.convertScaleAbs(picture, alpha=0.42), band, picture)
 
 

@@ -11,6 +11,7 @@ from perdure.draw.colours import Colour
 from perdure.draw.labels import Place
 
 Lines = list[NDArray[np.int32]]  # each (n, 2): points x, y
+SHIFT = 4  # of lines between pixels
 
 
 class Style(NamedTuple):
@@ -42,6 +43,13 @@ class Stroke(NamedTuple):
     lines: Lines
     colour: Colour
     width: int
+    shift: int = 0  # points are in parts of a pixel, of which there are 2 ** shift
+
+
+def between_pixels(line: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return a line (n, 2), pixel (0, 0) reaching from 0 to 1, in the parts of a pixel that `SHIFT` says, as cv2 draws it."""
+    near = np.clip(line - 0.5, -16000, 16000)  # cv2 counts pixels from their middles
+    return np.rint(near * (1 << SHIFT)).astype(np.int32)
 
 
 def whole(box: NDArray[np.float32]) -> Place:
