@@ -6,8 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perdure.maths.kernels.narrow_band import PIECES, carry, measure, pieces, rates, sample
-from perdure.maths.kernels.narrow_band_twin import carry_twin, measure_twin, pieces_twin, rates_twin, sample_twin
+from perdure.maths.kernels.narrow_band import PIECES, borders, carry, measure, pieces, rates, sample
+from perdure.maths.kernels.narrow_band_twin import (
+    borders_twin,
+    carry_twin,
+    measure_twin,
+    pieces_twin,
+    rates_twin,
+    sample_twin,
+)
 
 pictures = given(st.integers(0, 2**32 - 1), st.integers(1, 14), st.integers(1, 14))
 
@@ -51,6 +58,18 @@ def test_distances_in_the_band_are_the_least_of_all(seed, height, width):
         np.testing.assert_array_equal((near < 0)[sure], (phi < 0)[sure])
     np.testing.assert_allclose(results[0][0], results[1][0], rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(results[0][1], results[1][1])
+
+
+@pictures
+def test_distances_from_the_border_are_those_to_the_nearest_pixel_of_the_other_kind(seed, height, width):
+    rng = np.random.default_rng(seed)
+    mask = picture(rng, height, width) < rng.normal()
+    if mask.all() or not mask.any():
+        return
+    found, expected = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan)
+    borders(mask, np.full((3, width + 3), np.nan), found)
+    borders_twin(mask, np.empty((3, width + 3)), expected)
+    np.testing.assert_array_equal(found, expected)
 
 
 @pictures

@@ -71,17 +71,15 @@ def signed_distance(mask: Bits) -> Float:
     >>> signed_distance(np.array([[False, True, True, False]])).tolist()
     [[0.5, -0.5, -0.5, 0.5]]
     """
-    import cv2
+    from perdure.maths.kernels.narrow_band import borders
 
     if mask.ndim != 2 or mask.dtype != np.bool_ or not mask.size:
         raise ParameterError(f"mask is {mask.dtype} of the shape {mask.shape}; it must be bool (H, W) with pixels")
     if mask.all() or not mask.any():
         return np.full(mask.shape, np.hypot(*mask.shape) * (-1 if mask.any() else 1))
-    bits = np.ascontiguousarray(mask).view(np.uint8)
-    within, without = (cv2.distanceTransform(one, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for one in (bits, 1 - bits))
-    squared = np.square(np.add(within, without, dtype=np.float64))  # one of the two is 0
-    distance = np.sqrt(np.rint(squared))  # the last bit of OpenCV's own roots is not the same in every run
-    return np.asarray(np.where(mask, 0.5 - distance, distance - 0.5), np.float64)
+    found = np.empty(mask.shape)
+    borders(np.ascontiguousarray(mask), np.empty((3, mask.shape[1] + 3)), found)
+    return found
 
 
 def redistance(phi: ArrayLike, *, band: float = BAND) -> Float:
@@ -308,8 +306,12 @@ def inside(phi: ArrayLike) -> Float:
 
     (1 - phi / ε - sin(π phi / ε) / π) / 2 for ε = 1.5 (Zhao, Chan, Merriman & Osher, 1996).
     """
-    part = np.clip(_picture(phi, "phi") / _SMOOTH, -1, 1)
-    return np.asarray(np.clip((1 - part - np.sin(np.pi * part) / np.pi) / 2, 0, 1), np.float64)
+    given = _picture(phi, "phi")
+    shares = (given < 0).astype(np.float64)
+    near = np.abs(given) < _SMOOTH  # a sine for the rest would cost more than all else
+    part = given[near] / _SMOOTH
+    shares[near] = np.clip((1 - part - np.sin(np.pi * part) / np.pi) / 2, 0, 1)
+    return shares
 
 
 def moments(phi: ArrayLike) -> Moments:

@@ -187,6 +187,65 @@ def _settled(held: Float, y: int, x: int, distance: float) -> float:
     return -distance if -CLOSEST < distance < 0 else distance
 
 
+@kernel_for(given(np.bool_, 2, "C"), changed(np.float64, 2), changed(np.float64, 2))
+def borders(mask: Bits, room: Float, out: Float) -> None:
+    """Write distances of pixels from the border between a mask and the rest, half a pixel from both; below 0 inside.
+
+    Columns, then rows, by the lower envelope of parabolas (Felzenszwalb & Huttenlocher, *Distance transforms of sampled
+    functions*, 2012). In a row, pixels of one kind need no look beyond the next of the other kind, so that every pixel
+    is in one envelope, and both kinds are found at once.
+
+    Parameters
+    ----------
+    mask : (H, W) bool
+        With a border.
+    room : (3, ≥ W + 3) float64, changed
+        For columns, heights and bounds of the envelope.
+    out : (H, W) float64, changed
+        Every element is written.
+    """
+    height, width = mask.shape
+    none = float(height + 1)  # farther than any pixel of a column
+    for x in range(width):
+        out[0, x] = none
+    for y in range(1, height):
+        for x in range(width):
+            out[y, x] = out[y - 1, x] + 1 if mask[y, x] == mask[y - 1, x] else 1.0
+    for y in range(height - 2, -1, -1):
+        for x in range(width):
+            out[y, x] = min(out[y, x], out[y + 1, x] + 1 if mask[y, x] == mask[y + 1, x] else 1.0)
+    for y in range(height):
+        end = 0
+        while end < width:
+            begin = end
+            while end < width and mask[y, end] == mask[y, begin]:
+                end += 1
+            count = 0
+            for x in range(begin - 1, end + 1):
+                if x < 0 or x >= width:
+                    continue
+                far = out[y, x] if begin <= x < end else 0.0
+                if far >= none:
+                    continue
+                here, bound = far * far, -1.0
+                while count > 0:
+                    place = room[0, count - 1]
+                    bound = ((here + x * x) - (room[1, count - 1] + place * place)) / (2 * (x - place))
+                    if bound > room[2, count - 1]:
+                        break
+                    count -= 1
+                room[0, count], room[1, count], room[2, count] = x, here, bound if count > 0 else -1.0
+                count += 1
+            room[2, count] = width
+            near = 0
+            for x in range(begin, end):
+                while room[2, near + 1] < x:
+                    near += 1
+                away = x - room[0, near]
+                distance = np.sqrt(away * away + room[1, near])
+                out[y, x] = 0.5 - distance if mask[y, x] else distance - 0.5
+
+
 @kernel_for(
     given(np.float64, 2, "C"),
     given(np.int64, 1, "C"),
