@@ -3,8 +3,8 @@
     python bench/trackcut_paper.py [--parts davis composites pets domain speed] [--data DIR] [--draw DIR] [--json] [--write]
 
 davis       six sequences of DAVIS 2016 (val), from the mask of the first frame, at defaults, online. J is the mean
-            IoU of mask and truth over all frames but the first and the last, as DAVIS counts. Beside it two baselines
-            that see the same: `flow` carries each pixel of the mask by dense flow (DIS, the preset that the tracker
+            IoU of mask and truth over all frames but the first and the last, as DAVIS counts. Beside it `contour`, and
+            two baselines that see the same: `flow` carries each pixel of the mask by dense flow (DIS, the preset that the tracker
             has, on the whole picture), `flow + GrabCut` gives the carried mask to cv2.grabCut (2 iterations, in a box
             round it; GROWN pixels round its edge are open, the rest is certain), and goes on from what comes of it.
             OFL and BVS are published figures (PUBLISHED), not run here. Milliseconds are of the step alone, pictures
@@ -49,6 +49,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -204,9 +205,9 @@ Step = Callable[[Frame], Bits]
 Begin = Callable[[Frame, Bits], Step]  # the first frame and its mask -> what finds the mask of each next one
 
 
-def by_tracker(first: Frame, marked: Bits) -> Step:
-    """Follow the mask by our tracker."""
-    tracker = TRACKERS[TRACKER]()
+def by_tracker(name: str, first: Frame, marked: Bits) -> Step:
+    """Follow the mask by a tracker of ours."""
+    tracker = TRACKERS[name]()
     height, width = marked.shape
     state, _ = tracker.step(tracker.start(Scene(width, height, DAVIS_FPS)), first, marked_regions(marked))
 
@@ -285,7 +286,11 @@ def grabcut(image: Image, mask: Bits) -> Bits:
     return found
 
 
-METHODS: dict[str, Begin] = {TRACKER: by_tracker, "flow": by_flow, "flow + GrabCut": by_flow_and_grabcut}
+METHODS: dict[str, Begin] = {
+    **{name: partial(by_tracker, name) for name in (TRACKER, "contour")},
+    "flow": by_flow,
+    "flow + GrabCut": by_flow_and_grabcut,
+}
 
 
 def davis(folder: Path, drawings: Path | None) -> list[Carried]:
