@@ -275,3 +275,18 @@ def test_depth_is_positive_inside_and_far_where_there_is_nothing():
     assert (depth(inside) < 0).all()
     inside[3:6, 3:6] = True
     assert depth(inside)[4, 4] > 1 > -1 > depth(inside)[0, 0]
+
+
+def test_what_shines_through_a_hole_that_the_detector_filled_is_not_the_objects():
+    disc = Thing(lambda k: (-30 + 4 * k, 60), (170, 60, 60), (40, 60))
+    hole = disc._replace(size=(18, 28))
+    frames = [
+        Frame(one.index, one.time, np.where(hole.bits(one.index)[..., None], ground.image, one.image))
+        for one, ground in zip(film(disc, count=45), film(count=45), strict=True)
+    ]
+    means = []
+    for weight in (0.0, 2.0):
+        tracks, _ = followed(frames, lambda k: seen((disc,), k), backdrop=weight)
+        assert set(tracks.ids.tolist()) == {1}
+        means.append(np.mean([overlap(tracks, k, 1, disc.bits(k) & ~hole.bits(k)) for k in range(20, 45)]))
+    assert means[0] < 0.95 < means[1], means

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from films import HEIGHT, WIDTH, Thing, film, followed, overlap, seen, texture, walker
 
+from perdure.scene.backdrop import Backdrop
 from perdure.trackers.trackcut.births import Nursery, births
 from perdure.trackers.trackcut.competing import apart, claims, divided
 from perdure.trackers.trackcut.learning import LONG, pieces
@@ -189,7 +190,7 @@ def test_a_lost_one_is_found_again_near_and_not_at_the_other_side():
     picture = texture(1, (90, 110, 90), HEIGHT, WIDTH)
     sight = look_at(picture)
     gone = target(1, block(20, 40, 20, 40), missed=0.3)
-    nursery = Nursery(20.0, 20.0, 15000, 3, 0.8, 4.0)
+    nursery = Nursery(20.0, 20.0, 15000, 3, 0.8, 4.0, Backdrop.unknown(HEIGHT, WIDTH))
     for x, again in ((30, True), (170, False)):
         picture = texture(1, (90, 110, 90), HEIGHT, WIDTH)
         picture[40:80, x : x + 20] = texture(4, RED, 40, 20)

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from perdure.features.masks import mask_overlaps, mask_shares
-from perdure.trackers.trackcut.likelihoods import learn_colours, of_colours
+from perdure.scene.backdrop import Backdrop
+from perdure.trackers.trackcut.likelihoods import learn_colours, of_backdrop, of_colours, unlike
 from perdure.trackers.trackcut.seeing import Sight, colours_of
 from perdure.trackers.trackcut.shapes import over, recent_motion, to_shape
 from perdure.trackers.trackcut.targets import RECENT, Target
@@ -34,6 +35,7 @@ class Nursery(NamedTuple):
     components: int  # of a mixture
     trust: float  # in first looks
     bound: float  # nats
+    backdrop: Backdrop
 
 
 class Born(NamedTuple):
@@ -132,9 +134,12 @@ def _newborn(
     height, width = sight.colours.shape[:2]
     window = around([mask.box], nursery.ring, nursery.cells, (height, width))
     cells = window.of_mask(mask)
+    seen = window.cut(sight.colours).astype(np.float32)
+    marked = bool(regions.data["mark"][row]) if "mark" in regions.data else False
+    _, bare = of_backdrop(seen, window, nursery.backdrop)
     colours = learn_colours(
-        window.cut(sight.colours).astype(np.float32),
-        cells > 0.5,
+        seen,
+        cells > 0.5 if marked else unlike(cells > 0.5, bare),
         np.ones(cells.shape, np.bool_),
         nursery.components,
     )
@@ -164,7 +169,7 @@ def _newborn(
         score=float(regions.scores[row]),
         class_=str(regions.classes[row]),
         links=(row,),
-        marked=bool(regions.data["mark"][row]) if "mark" in regions.data else False,
+        marked=marked,
     )
 
 

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.trackers.trackcut.likelihoods import of_colours, of_motions
+from perdure.scene.backdrop import Backdrop
+from perdure.trackers.trackcut.likelihoods import of_backdrop, of_colours, of_looks, of_motions
 from perdure.trackers.trackcut.moving import similarity
 from perdure.trackers.trackcut.places import vote
 from perdure.trackers.trackcut.placing import Company, placed
@@ -39,6 +40,7 @@ class Weights:
     place: float
     motion: float
     shape: float
+    backdrop: float
     bound: float
 
 
@@ -52,6 +54,7 @@ class Expected(NamedTuple):
     predicted: Bits  # (h, w) O at t given t-1
     moved: NDArray[np.float64]  # (2,) px a frame, beyond the camera's
     unary: Float  # (h, w) cost of being the object's less that of not being
+    bare: Bits  # (h, w) where it looks as if nothing were there
 
 
 def middle_of(target: Target) -> tuple[float, float]:
@@ -75,6 +78,7 @@ def expect(
     ring: float,
     cells: int,
     weights: Weights,
+    backdrop: Backdrop,
     company: Company | None = None,
 ) -> Expected:
     """Return what is expected of an object, and the evidence round it.
@@ -93,6 +97,8 @@ def expect(
         How many are looked at, at most.
     weights : Weights
         Of the evidence.
+    backdrop : Backdrop
+        What is behind all objects.
     company : Company, optional
         Among whom it is.
     """
@@ -129,7 +135,15 @@ def expect(
     slope = max(_SLOPE * float(np.sqrt(size)), _LEAST_SLOPE)
     shape = np.clip(away / np.float32(slope), -_SURE, _SURE)
     evidence = weights.colour * looks + weights.place * votes + weights.motion * motions + weights.shape * shape
-    return Expected(window, seen, last, belief, predicted, moved, -evidence)
+    there, bare = of_backdrop(seen, window, backdrop)
+    if weights.backdrop and bare.any():
+        evidence[bare] -= weights.backdrop * np.clip(there[bare] - _own(target, seen[bare]), 0, weights.bound)
+    return Expected(window, seen, last, belief, predicted, moved, -evidence, bare)
+
+
+def _own(target: Target, points: Float) -> Float:
+    """Return ln p (N,) of colours (N, 3) under an object's looks, at first or last."""
+    return np.maximum(of_looks(points, target.first), of_looks(points, target.last))
 
 
 def _window(target: Target, drift: NDArray[np.float64], ring: float, cells: int, sight: Sight) -> Window:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from perdure.trackers.trackcut.competing import HALF, Claim
 from perdure.trackers.trackcut.expecting import Expected
-from perdure.trackers.trackcut.likelihoods import learn_colours
+from perdure.trackers.trackcut.likelihoods import learn_colours, unlike
 from perdure.trackers.trackcut.seeing import Motion
 from perdure.trackers.trackcut.shapes import behind, of_size, to_shape
 from perdure.trackers.trackcut.targets import Target
@@ -99,7 +99,8 @@ def learnt(target: Target, seen: Seen, components: int) -> Target:
     )
     if partly or blind or shared:
         return target
-    last = learn_colours(expected.colours, cells, np.ones_like(cells), components, target.last)
+    own = cells if target.marked else unlike(cells, expected.bare)
+    last = learn_colours(expected.colours, own, np.ones_like(cells), components, target.last)
     share = max(_RATE, 1.0 / (target.seen_frames + 1))
     off = size - target.mean
     first = last if target.seen_frames < FAMILIAR and not target.marked else target.first

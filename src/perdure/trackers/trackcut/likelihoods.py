@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths.mixture import Mixture, fit, log_density, log_ratio, subsample
+from perdure.scene.backdrop import LEAST, Backdrop
 from perdure.trackers.trackcut.targets import Colours
+from perdure.trackers.trackcut.windows import Window
+from perdure.types import Bits
 
 Float = NDArray[np.float32]
 _SAMPLE = 2000  # pixels a mixture is fitted to, at most
@@ -16,6 +19,8 @@ _LEAST_TRUST = 1e-9  # in either looks
 _FAR = 25.0  # nats: as unlikely as a colour may be
 _STILL = 0.4  # px a frame by which flow errs at least
 _ROUGH = 0.1  # share of a motion by which parts of an object differ from it
+_BARE = 2.0  # deviations of each channel, up to which a colour is that of the backdrop
+_MOST_BARE = 0.6  # share of an object that may look like the backdrop; of more, colours do not tell
 
 
 def learn_colours(
@@ -68,3 +73,22 @@ def of_motions(flow: Float, sure: NDArray[np.bool_], bound: float, known: Float 
     out = np.empty(flow.shape[:2], np.float32)
     student_ratios(np.ascontiguousarray(flow), middle, spread, np.float32(_STILL), np.float32(bound), out)
     return out
+
+
+def of_backdrop(colours: Float, window: Window, backdrop: Backdrop) -> tuple[Float, Bits]:
+    """Return ln p (h, w) of the colours (h, w, 3) of a window if nothing is there, and where they are the backdrop's.
+
+    -∞ where it is not known what is behind.
+    """
+    variance = np.maximum(window.cut(backdrop.variance), np.float32(LEAST))
+    off = colours - window.cut(backdrop.colours)
+    squares = np.einsum("hwc,hwc->hw", off, off) / variance
+    known = window.cut(backdrop.known.view(np.uint8)) > 0
+    density = np.float32(-0.5) * squares - np.float32(1.5) * np.log(np.float32(2 * np.pi) * variance)
+    return np.where(known, density, -np.inf).astype(np.float32), known & (squares < 3 * _BARE**2)
+
+
+def unlike(cells: Bits, bare: Bits) -> Bits:
+    """Return those of an object's cells (h, w) that are not the backdrop's: all, if too few remain."""
+    rest = np.asarray(cells & ~bare, np.bool_)
+    return rest if np.count_nonzero(rest) >= (1 - _MOST_BARE) * np.count_nonzero(cells) else cells

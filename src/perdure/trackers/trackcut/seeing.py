@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import cv2
@@ -38,6 +39,14 @@ class Motion(NamedTuple):
         moved = cv2.remap(self.flow.vectors, there, ONE_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return moved * np.float32(self.step)
 
+    def camera_of_pixels(self) -> NDArray[np.float64]:
+        """Return the camera's motion (2, 3), from pixels of the frame before to those of this one."""
+        half = (self.step - 1) / 2
+        camera = self.camera.copy()
+        if not np.array_equal(camera, np.eye(2, 3)):
+            camera[:, 2] = camera[:, 2] * self.step - camera[:, :2] @ (half, half) + half
+        return camera
+
     def of_camera(self, x: Float, y: Float) -> Float:
         """Return the displacement (…, 2), px a frame, that the camera's motion gives what is now at x, y."""
         return self.of_camera_at(np.stack([x, y], axis=-1))
@@ -49,6 +58,17 @@ class Motion(NamedTuple):
         away = np.eye(2, 3) - back  # (2, 3), what is there less what was
         away[:, 2] = away[:, 2] * self.step - away[:, :2] @ (half, half)
         return np.asarray(cv2.transform(places.reshape(-1, 1, 2), away), np.float32).reshape(places.shape)
+
+
+def covered(masks: Iterable[Mask], size: tuple[int, int], beside: int) -> Bits:
+    """Return where in a picture (height, width) any of some masks are, and some pixels beside them."""
+    held = np.zeros(size, np.uint8)
+    for one in masks:
+        x1, y1, x2, y2 = max(one.box[0], 0), max(one.box[1], 0), min(one.box[2], size[1]), min(one.box[3], size[0])
+        if x1 < x2 and y1 < y2:
+            held[y1:y2, x1:x2] |= one.bits[y1 - one.y : y2 - one.y, x1 - one.x : x2 - one.x].view(np.uint8)
+    side = 2 * beside + 1
+    return np.asarray(cv2.dilate(held, np.ones((side, side), np.uint8)), np.uint8).view(np.bool_)
 
 
 def look_at(image: Image) -> Sight:

@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 from perdure.features.masks import silhouettes
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
+from perdure.scene.backdrop import Backdrop, carried, learn
 from perdure.trackers.trackcut.births import Nursery, births
 from perdure.trackers.trackcut.companies import companies, company_of, hosts, sharing
 from perdure.trackers.trackcut.competing import Claim, claims
 from perdure.trackers.trackcut.cutting import Observed, contrast, cut_out, touching
 from perdure.trackers.trackcut.expecting import Expected, Weights, expect
 from perdure.trackers.trackcut.learning import FAMILIAR, LONG, Seen, learnt, pieces
-from perdure.trackers.trackcut.likelihoods import of_colours
+from perdure.trackers.trackcut.likelihoods import of_colours, unlike
 from perdure.trackers.trackcut.parting import ALONE, parted
 from perdure.trackers.trackcut.placing import Company
 from perdure.trackers.trackcut.saying import gone, happenings, has_left, rows_of
-from perdure.trackers.trackcut.seeing import Motion, Sight, colours_of, look_at, motion_between
+from perdure.trackers.trackcut.seeing import Motion, Sight, colours_of, covered, look_at, motion_between
 from perdure.trackers.trackcut.separating import clusters, separate
 from perdure.trackers.trackcut.shapes import to_shape
 from perdure.trackers.trackcut.targets import Shape, Target
@@ -33,6 +34,7 @@ _SHARED, _OWN, _OF_NEW = 0.5, 1.0, 4.0
 _ALIKE = 0.5  # nats a pixel by which what is found must look more like the object than like its surroundings
 _LARGER = 1.6  # times its mean size, from which an observation is not one object's alone
 _REFUSED = 3.0  # of that evidence, more, against the observations that are not the object's
+_BESIDE = 2  # pixels round what may be an object, that tell nothing of what is behind it
 _OTHERS = 0.5  # of the evidence against what lies outside its observations: against the places of others
 
 
@@ -48,6 +50,7 @@ class TrackCutState:
     next_id: int
     time: float  # s
     size: tuple[int, int]  # height, width
+    backdrop: Backdrop  # in Lab, as `colours`
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,7 @@ class TrackCut:
     place: float = parameter(2.0, "weight of colours at their places", low=0.0, high=100.0)
     moving: float = parameter(1.0, "weight of motion against the background's", low=0.0, high=100.0)
     form: float = parameter(0.5, "weight of the predicted silhouette", low=0.0, high=100.0)
+    backdrop: float = parameter(2.0, "weight of looking as if nothing were there", low=0.0, high=100.0)
     bound: float = parameter(4.0, "largest evidence of one kind for a pixel", unit="nats", low=0.1, high=60.0)
     outside: float = parameter(
         4.0,
@@ -93,7 +97,15 @@ class TrackCut:
         """Return the state without an object."""
         none = np.zeros((0, 0), np.uint8)
         return TrackCutState(
-            (), (), np.zeros((0, 0, 3), np.uint8), none, 1, self.reserved + 1, 0.0, (scene.height, scene.width)
+            (),
+            (),
+            np.zeros((0, 0, 3), np.uint8),
+            none,
+            1,
+            self.reserved + 1,
+            0.0,
+            (scene.height, scene.width),
+            Backdrop.unknown(scene.height, scene.width),
         )
 
     def step(self, state: TrackCutState, frame: Frame, regions: Regions) -> tuple[TrackCutState, Report]:
@@ -106,6 +118,7 @@ class TrackCut:
         events: list[Event] = []
         if state.grey.shape == sight.grey.shape and targets:
             motion = motion_between(state.grey, sight, _things(targets, sight))
+            state = replace(state, backdrop=carried(state.backdrop, motion.camera_of_pixels()))
             targets, events = self._followed(state, targets, frame, sight, motion, observations, regions.blind)
         nursery = Nursery(
             self.smallest * state.size[0] * state.size[1],
@@ -114,6 +127,7 @@ class TrackCut:
             self.components,
             self.trust,
             self.bound,
+            state.backdrop,
         )
         waiting = state.waiting if len(state.colours) else None
         keys = (state.next_key, state.next_id)
@@ -126,6 +140,8 @@ class TrackCut:
                 events.append(gone(one, frame, state.size))
             else:
                 kept.append(one)
+        things = [*(one.mask for one in kept), *(one.shape.to_mask() for one in kept), *observations]
+        learn(state.backdrop, sight.colours, covered(things, state.size, _BESIDE))
         rows = rows_of(kept, frame, state.size, self.hidden_for)
         events += happenings(state.targets, kept, frame)
         state = TrackCutState(
@@ -137,6 +153,7 @@ class TrackCut:
             next_id,
             frame.time,
             state.size,
+            state.backdrop,
         )
         return state, Report(rows, events=tuple(events))
 
@@ -155,14 +172,15 @@ class TrackCut:
         blind: bool,
     ) -> tuple[list[Target], list[Event]]:
         """Return the objects as they are in this frame, and whose names were exchanged."""
-        weights = Weights(self.looks, self.trust, self.place, self.moving, self.form, self.bound)
+        weights = Weights(self.looks, self.trust, self.place, self.moving, self.form, self.backdrop, self.bound)
         height, width = state.size
+        behind = state.backdrop
         ahead: list[Expected] = []
         among: list[Company | None] = []
         for target in targets:
             ring, fineness = self._closeness(target, observations)
             among.append(company_of(target, targets, ahead, [] if blind else observations, state.size))
-            ahead.append(expect(target, state.colours, sight, motion, ring, fineness, weights, among[-1]))
+            ahead.append(expect(target, state.colours, sight, motion, ring, fineness, weights, behind, among[-1]))
         predicted = [one.window.to_mask(one.predicted, height, width) for one in ahead]
         there = [one.missed == 0 for one in targets]
         halves = [one.pieces >= LONG for one in targets]
@@ -176,7 +194,9 @@ class TrackCut:
             cells, matched, touches = self._cut(target, expected, claimed[number], others, refused)
             if touches:
                 ring, fineness = self._closeness(target, observations)
-                expected = expect(target, state.colours, sight, motion, 2 * ring, fineness, weights, among[number])
+                expected = expect(
+                    target, state.colours, sight, motion, 2 * ring, fineness, weights, behind, among[number]
+                )
                 cells, matched, _ = self._cut(target, expected, claimed[number], others, refused)
             nobodys = [one for k, one in enumerate(observations) if k not in owned]
             if not blind and nobodys:  # what it has let go of is no part of it
@@ -222,6 +242,7 @@ class TrackCut:
         costs, sigma = contrast(colours, self.contrast)
         seen, numbers = [], []
         held = np.zeros(window.shape, np.float32)
+        doubtful = np.zeros(window.shape, np.bool_)
         for claim in claimed:
             cells = window.of_mask(claim.part) > 0.5
             if not cells.any():
@@ -230,6 +251,9 @@ class TrackCut:
             trust = _SHARED
             if claim.alone and (new or claim.part.area < _LARGER * target.mean):
                 trust = _OF_NEW if new else _OWN
+            own = unlike(cells, expected.bare) if self.backdrop else cells
+            doubtful |= cells & ~own
+            cells = own
             held[cells] = np.maximum(held[cells], trust)
             mean = colours[cells].mean(axis=0)
             ratio = float(of_colours(mean[None], target.first, target.last, self.trust, self.bound)[0])
@@ -237,7 +261,10 @@ class TrackCut:
             numbers.append(claim.number)
         unary = expected.unary + np.float32(_OTHERS * self.outside) * _elsewhere(others, expected)
         if seen:
-            unary = unary + np.float32(self.outside) * np.where(held > 0, -held, 1.0).astype(np.float32)
+            without = np.where(
+                doubtful, np.float32(0), np.float32(1)
+            )  # an observation's holes may have been filled
+            unary = unary + np.float32(self.outside) * np.where(held > 0, -held, without)
             unary[window.of_masks(refused) & (held == 0)] += _REFUSED * self.outside
         best = cut_out(unary, costs, sigma, colours, seen, self.link, self.bound / 4)
         anchors = expected.predicted.copy()
