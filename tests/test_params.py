@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perdure.errors import ParameterError
-from perdure.params import build, describe, parameter, values
+from perdure.params import Schedule, build, describe, parameter, values
 
 
 @dataclass(frozen=True)
@@ -53,3 +53,37 @@ def test_numpy_numbers_are_numbers():
 def test_a_wrong_value_is_named_with_what_would_do(given, said):
     with pytest.raises(ParameterError, match=said.replace("(", r"\(")):
         build(Example, given)
+
+
+@dataclass(frozen=True)
+class Changing:
+    gain: Schedule = parameter(Schedule(0.8), "how much is believed", low=0.0, high=1.0)
+
+
+@pytest.mark.parametrize("given", ["0.1,0.5@40", [(0, 0.1), (40, 0.5)], ((0, np.float32(0.125)), (40, 0.5))])
+def test_a_schedule_is_a_number_from_a_frame_on(given):
+    gain = build(Changing, {"gain": given}).gain
+    assert [gain.at(frame) for frame in (0, 39)] == [pytest.approx(0.1, abs=0.03)] * 2
+    assert [gain.at(frame) for frame in (40, 10**6)] == [0.5, 0.5]
+
+
+@pytest.mark.parametrize("given", [0.5, "0.5", "0.50@0", np.float64(0.5)])
+def test_a_schedule_of_one_number_is_that_number(given):
+    made = build(Changing, {"gain": given})
+    assert values(made) == {"gain": "0.5"}
+    assert made == build(Changing, values(made))
+    assert made.gain.steps == ((0, 0.5),)
+
+
+@pytest.mark.parametrize("given", ["0.1,2@40", -0.1, "nan", [(0, 0.1), (9, float("inf"))], 10**400])
+def test_a_schedule_out_of_range_is_refused(given):
+    with pytest.raises(ParameterError, match=r"gain = .*(out of range: it must be 0 to 1|is not a number)"):
+        build(Changing, {"gain": given})
+
+
+@pytest.mark.parametrize(
+    "given", ["", "high", "0.1,0.5", "0.5@40", "0.1,0.5@9,0.6@9", "0.1@x", True, None, [3], []]
+)
+def test_what_is_no_schedule_is_refused(given):
+    with pytest.raises(ParameterError, match=r"gain = .* is not a number, or numbers as"):
+        build(Changing, {"gain": given})

@@ -21,9 +21,10 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import itertools
 import math
 import numbers
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_type_hints
 
@@ -33,6 +34,63 @@ from perdure.errors import ParameterError
 
 T = TypeVar("T")
 Value = bool | int | float | str
+
+
+class Schedule(str):
+    """A number that may change from frame to frame: '0.1,0.5@40' is 0.1, and 0.5 from frame 40 on.
+
+    Frames are the source's own and count from 0. It is made from such a text, a number, or pairs (frame, number).
+
+    Raises
+    ------
+    ParameterError
+        For what is no such text, or has frames that do not rise from 0.
+
+    Examples
+    --------
+    >>> Schedule(0.5)
+    '0.5'
+    >>> Schedule([(0, 0.1), (40, 0.5)]).at(39)
+    0.1
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, given: object) -> Schedule:
+        """Return the schedule that is meant."""
+        if isinstance(given, cls):
+            return given
+        steps = _steps(given)
+        frames = [frame for frame, _ in steps]
+        if not steps or frames[0] != 0 or any(late <= early for early, late in itertools.pairwise(frames)):
+            raise ParameterError(f"{given!r} is not {_KIND_WORDS[cls]}: its frames must rise from 0")
+        words = [f"{number:.12g}" if frame == 0 else f"{number:.12g}@{frame}" for frame, number in steps]
+        return super().__new__(cls, ",".join(words))
+
+    @property
+    def steps(self) -> tuple[tuple[int, float], ...]:
+        """Pairs of a frame and the number from it on, the first from frame 0."""
+        return _steps(str(self))
+
+    def at(self, frame: int) -> float:
+        """Return the number of a frame; before the first one it is that of the first."""
+        steps = self.steps
+        return next((number for since, number in reversed(steps) if since <= frame), steps[0][1])
+
+
+def _steps(given: object) -> tuple[tuple[int, float], ...]:
+    """Pairs of a frame and a number, of a text, a number or pairs."""
+    try:
+        if isinstance(given, str):
+            parts = [part.partition("@") for part in given.split(",")]
+            return tuple((int(frame) if at else 0, float(number)) for number, at, frame in parts)
+        if isinstance(given, Sequence):
+            return tuple((int(frame), float(number)) for frame, number in given)
+        if isinstance(given, numbers.Real) and not isinstance(given, (bool, np.bool_)):
+            return ((0, float(given)),)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ParameterError(f"{given!r} is not {_KIND_WORDS[Schedule]}")
 
 
 @dataclass(frozen=True)
@@ -131,6 +189,9 @@ def check(instance: object) -> None:
 
 def check_value(declared: Parameter, value: object) -> None:
     """Refuse one value that is not of its parameter's kind or out of its range."""
+    if declared.kind is Schedule:
+        _check_schedule(declared, value)
+        return
     if not _is_kind(value, declared.kind):
         raise ParameterError(
             f"{declared.name} = {value!r} is not {_KIND_WORDS[declared.kind]} ({declared.full_help})"
@@ -142,6 +203,19 @@ def check_value(declared: Parameter, value: object) -> None:
     if isinstance(value, numbers.Real) and not declared.low <= _finite(value) <= declared.high:
         span = f": it must be {declared.range_text}" if declared.range_text else ": it must be a finite number"
         raise ParameterError(f"{declared.name} = {value!r} is out of range{span} ({declared.help})")
+
+
+def _check_schedule(declared: Parameter, value: object) -> None:
+    """Refuse what is no schedule, or has a number out of range."""
+    try:
+        steps = Schedule(value).steps
+    except ParameterError as error:
+        raise ParameterError(f"{declared.name} = {error} ({declared.full_help})") from None
+    for _, number in steps:
+        if not declared.low <= number <= declared.high or math.isinf(number):
+            raise ParameterError(
+                f"{declared.name} = {value!r} is out of range: it must be {declared.range_text} ({declared.help})"
+            )
 
 
 def values(instance: object) -> dict[str, Value]:
@@ -175,7 +249,13 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     return f"{name!r} is not a {what}; {hint}"
 
 
-_KIND_WORDS: Mapping[type, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a word"}
+_KIND_WORDS: Mapping[type, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a word",
+    Schedule: "a number, or numbers as '0.1,0.5@40', each from a frame on",
+}
 
 
 def _finite(value: numbers.Real) -> float:

@@ -125,7 +125,7 @@ def test_the_error_of_a_target_of_constant_velocity_decays_for_every_gain(gain: 
 
 
 def test_with_the_defaults_a_constant_velocity_is_known_within_fifteen_frames():
-    gains = Gains(DEFAULTS.shape_gain, DEFAULTS.motion_gain)
+    gains = Gains(DEFAULTS.shape_gain.at(0), DEFAULTS.motion_gain.at(0))
     places, speeds = follow_shapes(lambda k: (60 + 3.3 * k, 70 + 0.6 * k), 36, gains)
     assert places[14:].max() < 0.2
     assert speeds[14:].max() < 0.05
@@ -348,6 +348,22 @@ def test_a_users_own_motion_is_what_predicts():
 
     followed(film(straight, 8), marked(straight), moved=still)
     assert max(asked) == Contour().window
+
+
+def test_gains_may_follow_a_schedule_or_a_function_of_the_user():
+    frames = film(straight, 14)
+    tight = Mask.of_image(cv2.erode(bits(straight, 0).astype(np.uint8), np.ones((9, 9), np.uint8)) > 0)
+    first = Regions.of([tight.box], masks=[tight], data={"mark": np.array([1])})
+
+    def shapes(**parameters: object) -> list[np.ndarray]:
+        tracks, _ = followed(frames, lambda k: first if k == 0 else Regions.empty(), **parameters)
+        return [tracks.in_frame(k).believed[0].to_image(HEIGHT, WIDTH) for k in range(14)]
+
+    rising, low = shapes(shape_gain="0,0.8@8"), shapes(shape_gain=0)
+    asked = shapes(gained=lambda k: Gains(0.0 if k < 8 else 0.8, 0.6))
+    assert np.array_equal(rising[:8], low[:8])
+    assert not np.array_equal(rising[13], low[13])
+    assert np.array_equal(rising, asked)
 
 
 def test_grey_films_are_followed():

@@ -167,7 +167,8 @@ def _option(declared: params.Parameter, owners: list[str]) -> inspect.Parameter:
     notes = "; ".join(part for part in (declared.range_text, f"default {default}") if part)
     text = f"{declared.help[0].upper()}{declared.help[1:]} ({notes})."
     option = typer.Option(*names, help=text, show_default=False, rich_help_panel=_heading(owners))
-    annotation: Any = Annotated[Optional[declared.kind], option]  # noqa: UP045
+    kind = str if declared.kind is params.Schedule else declared.kind
+    annotation: Any = Annotated[Optional[kind], option]  # noqa: UP045
     return inspect.Parameter(declared.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 

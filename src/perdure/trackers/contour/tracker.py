@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from perdure.features.masks import mask_overlaps, mask_shares, silhouettes
 from perdure.maths import lie
 from perdure.maths.mixture import log_density
-from perdure.params import parameter
+from perdure.params import Schedule, parameter
 from perdure.trackers.contour import observer
 from perdure.trackers.contour.measuring import Measured, measured, of_evidence
 from perdure.trackers.contour.observer import Gains, State
@@ -84,9 +84,19 @@ class _Seen(NamedTuple):
 class Contour:
     """The contour observer: a shape that deforms slowly, and the motion of a group, corrected by what each frame shows."""
 
-    shape_gain: float = parameter(0.8, "how much of a measured shape is believed", low=0.0, high=1.0, symbol="L_μ")
-    motion_gain: float = parameter(
-        0.6, "how much of a measured motion is believed", low=0.0, high=1.0, symbol="L_v"
+    shape_gain: Schedule = parameter(
+        Schedule(0.8),
+        "how much of a measured shape is believed, as '0.1,0.5@40' from frames on",
+        low=0.0,
+        high=1.0,
+        symbol="L_μ",
+    )
+    motion_gain: Schedule = parameter(
+        Schedule(0.6),
+        "how much of a measured motion is believed, as '0.1,0.5@40' from frames on",
+        low=0.0,
+        high=1.0,
+        symbol="L_v",
     )
     gains: str = parameter(
         "automatic", "gains as they are, or by the share that is seen", choices=("automatic", "constant")
@@ -117,6 +127,7 @@ class Contour:
     )
     flow: bool = parameter(True, "whether what is seen of an object tells by its flow how it moves")
     moved: Callable[[Float], Float] | None = field(default=None, repr=False)  # the user's own motion model
+    gained: Callable[[int], Gains] | None = field(default=None, repr=False)  # and his own gains of a frame
     reserved: int = field(default=0, repr=False)  # ids up to it are those of marks, also of later ones
 
     needs_pixels = True
@@ -139,7 +150,7 @@ class Contour:
         light = np.asarray(cv2.cvtColor(np.ascontiguousarray(frame.image), cv2.COLOR_RGB2GRAY), np.uint8)
         sights = [self._look(*self._moved(one, state.light, light), lab, place) for one in state.targets]
         waited = frame.time - state.time
-        targets = self._updated(state.targets, sights, waited)
+        targets = self._updated(state.targets, sights, self._gains_of(frame.index), waited)
         targets, born, waiting, events = self._born(state, targets, frame, lab, place, regions)
         place = learnt_place(place, lab, self._things(targets, state.size), _PLACE_RATE)
         kept, believed = [], []
@@ -170,6 +181,12 @@ class Contour:
     @property
     def _motion(self) -> Callable[[Float], Float]:
         return self.moved or observer.MOTIONS[self.motion]
+
+    def _gains_of(self, index: int) -> Gains:
+        """Return the gains of a frame, before anything is known of what is seen."""
+        if self.gained is not None:
+            return self.gained(index)
+        return Gains(Schedule(self.shape_gain).at(index), Schedule(self.motion_gain).at(index))
 
     # Measuring ----------------------------------------------------------------------------------------------
 
@@ -282,13 +299,15 @@ class Contour:
 
     # Updating -----------------------------------------------------------------------------------------------
 
-    def _updated(self, targets: tuple[Target, ...], sights: list[_Seen], waited: float) -> list[Target]:
+    def _updated(
+        self, targets: tuple[Target, ...], sights: list[_Seen], gains: Gains, waited: float
+    ) -> list[Target]:
         """Return the objects with shape, pose and looks brought up to date."""
         found = []
         for number, (target, sight) in enumerate(zip(targets, sights, strict=True)):
             taken = self._taken(number, sights)
             known = sight.known & ~taken
-            found.append(self._one_updated(target, sight, known, waited))
+            found.append(self._one_updated(target, sight, known, gains, waited))
         return found
 
     def _taken(self, number: int, sights: list[_Seen]) -> Bits:
@@ -307,16 +326,16 @@ class Contour:
             taken |= (moved > 0) & ((own.depth >= 0) | (moved >= own.evidence))
         return taken
 
-    def _one_updated(self, target: Target, sight: _Seen, known: Bits, waited: float) -> Target:
+    def _one_updated(self, target: Target, sight: _Seen, known: Bits, gains: Gains, waited: float) -> Target:
         one = self._measured(sight.window, sight.evidence, known)
         area = _support(sight.depth, one, self.reach)
         visible = min(1.0, area / max(target.usual, 1.0))
         state, group = sight.state, self._group
         if self.gains == "automatic":
             share = min(max((visible - _FROZEN) / (_WHOLE - _FROZEN), 0.0), 1.0)
-            gains = Gains(self.shape_gain * share, self.motion_gain * visible)
+            gains = Gains(gains.shape * share, gains.motion * visible)
         else:
-            share, gains = 1.0, Gains(self.shape_gain, self.motion_gain)
+            share = 1.0
         if visible < _HIDDEN and self.gains == "automatic":
             blank = measured(np.zeros((1, 1)), 0)
             state = observer.coasted(
