@@ -15,6 +15,7 @@ from perdure.trackers.contour import Contour, ContourState
 from perdure.trackers.contour import observer as paper
 from perdure.trackers.contour.measuring import Measured, measured, of_distance, of_evidence, of_shape
 from perdure.trackers.contour.observer import Gains, State
+from perdure.trackers.contour.seeing import Window
 from perdure.types import Frame, Mask, Regions, Report, Scene, Status, Tracks
 
 HEIGHT, WIDTH = 120, 200
@@ -199,6 +200,18 @@ def test_every_measurement_says_inside_where_the_object_is():
     likely = of_evidence(np.where(shape, 3.0, -3.0), np.ones(shape.shape, bool), reach=0)
     assert np.array_equal(likely.pull < 0, shape)
     assert not of_evidence(np.where(shape, 3.0, -3.0), np.zeros(shape.shape, bool), reach=0).pull.any()
+
+
+@pytest.mark.parametrize("step", [1, 2])
+@pytest.mark.parametrize("x", [-90, -22, -5, 3, 26, 70])
+@pytest.mark.parametrize("y", [-60, 4, 40])
+def test_a_window_may_lie_anywhere_about_the_picture(x: int, y: int, step: int):
+    picture = np.random.default_rng(0).integers(0, 255, (30, 40, 3), np.uint8)
+    window = Window(x, y, step, 9, 11)
+    wide = np.pad(picture, ((100, 100), (100, 100), (0, 0)), mode="edge")
+    there = wide[y + 100 : y + 100 + 9 * step, x + 100 : x + 100 + 11 * step]
+    means = there.reshape(9, step, 11, step, 3).mean(axis=(1, 3))
+    assert np.abs(window.cut(picture) - means).max() <= 0.5
 
 
 # Films --------------------------------------------------------------------------------------------------------------

@@ -36,24 +36,11 @@ class Window(NamedTuple):
         """Return the cells (h, w, …) of a picture: means of their pixels, its border repeated outside."""
         x2, y2 = self.x + self.width * self.step, self.y + self.height * self.step
         rows, columns = picture.shape[:2]
-        left, top, right, bottom = (
-            min(max(self.x, 0), columns - 1),
-            min(max(self.y, 0), rows - 1),
-            max(min(x2, columns), 1),
-            max(min(y2, rows), 1),
-        )
-        part = np.ascontiguousarray(picture[top : max(bottom, top + 1), left : max(right, left + 1)])
-        sides = [top - self.y, 0, left - self.x, 0]
-        sides[1] = self.height * self.step - sides[0] - part.shape[0]
-        sides[3] = self.width * self.step - sides[2] - part.shape[1]
-        if min(sides) < 0:
-            part = part[max(-sides[0], 0) :, max(-sides[2], 0) :][
-                : self.height * self.step, : self.width * self.step
-            ]
-            sides = [max(side, 0) for side in sides]
-        if any(sides):
-            up, down, before, after = sides
-            part = np.asarray(cv2.copyMakeBorder(part, up, down, before, after, cv2.BORDER_REPLICATE))
+        if self.x >= 0 and self.y >= 0 and x2 <= columns and y2 <= rows:
+            part = picture[self.y : y2, self.x : x2]
+        else:
+            down = np.clip(np.arange(self.y, y2), 0, rows - 1)
+            part = picture[down[:, None], np.clip(np.arange(self.x, x2), 0, columns - 1)]
         if self.step == 1:
             return np.ascontiguousarray(part)
         return cv2.resize(part, (self.width, self.height), interpolation=cv2.INTER_AREA)
