@@ -26,6 +26,7 @@ _ABOUT = 0.25  # cells by which the gauge may be off before μ is drawn anew
 _TRUST = 0.9  # share of the whole contour's moments in the preconditioner, where part of it says nothing
 _STILL = 0.01  # pixels below which a correction is none
 _MOST = 0.25  # radians, or logarithm of a scale, a frame
+_CUT = 2.0  # cells beyond which distances count no more where shapes are blended
 _EVERYTHING = 2.0  # no pull is more
 
 
@@ -72,7 +73,7 @@ def initial(mask: NDArray[np.bool_], x: int, y: int, group: lie.Group, cell: flo
     pose[:2, :2] *= cell
     pose[:2, 2] = middle[0] + x - room, middle[1] + y - room
     shape = (int(np.ceil(sides[0] / cell)) | 1, int(np.ceil(sides[1] / cell)) | 1)
-    to_cells = _about(shape) @ lie.inverse(pose) @ _shift(np.array([x - room, y - room], np.float64))
+    to_cells = about(shape) @ lie.inverse(pose) @ _shift(np.array([x - room, y - room], np.float64))
     drawn = levelset.redistance(levelset.carried(phi, to_cells, shape))
     still = np.zeros(group.dimension)
     return gauged(State(drawn, pose, np.zeros((0, group.dimension)), (), still, still), group=group)
@@ -141,7 +142,7 @@ def energy(
 
 def discrepancy(shape: Float, pose: Float, one: Measured) -> float:
     """Return E(h_τ) (3): f_in over the inside of g μ and f_out over the rest, in square pixels."""
-    there = one.to_cells() @ pose @ lie.inverse(_about(shape.shape))
+    there = one.to_cells() @ pose @ lie.inverse(about(shape.shape))
     inside = levelset.inside(levelset.carried(shape, there, one.pull.shape))
     return float((inside * one.loss_inside() + (1 - inside) * one.loss_outside()).sum()) * one.step**2
 
@@ -150,7 +151,7 @@ def shape_gradient(shape: Float, every: Float, measurements: Sequence[Measured])
     """Return ∇_μ φ (5) as a field (h, w) over μ's picture: Σ_τ |J_g(τ)| (f_in - f_out)(g(τ) x), along the normal."""
     total = np.zeros(shape.shape)
     for pose, one in zip(every, measurements, strict=True):
-        there = one.to_cells() @ pose @ lie.inverse(_about(shape.shape))
+        there = one.to_cells() @ pose @ lie.inverse(about(shape.shape))
         total += abs(float(lie.determinant(pose))) * _seen_from(there, one.pull, shape.shape)
     return total
 
@@ -168,7 +169,7 @@ def velocity_gradient(
 
 def edges_of(shape: Float) -> Float:
     """Return the edges (M, 4) x, y, x, y of the contour ∂μ, about the origin."""
-    middle = _about(shape.shape)[:2, 2]
+    middle = about(shape.shape)[:2, 2]
     lines = [np.hstack([line, np.roll(line, -1, axis=0)]) for line in levelset.contour(shape)]
     return np.concatenate(lines) - np.tile(middle, 2) if lines else np.zeros((0, 4))
 
@@ -190,6 +191,7 @@ def updated(
     robust: float = _EVERYTHING,
     free: int = 6,
     force: Callable[[Float, Float], Float] | None = None,
+    least: bool = False,
 ) -> State:
     """Return the state at t+1, from a measurement (4).
 
@@ -221,6 +223,8 @@ def updated(
         Of the group's coordinates the first so many are corrected.
     force : function, optional
         What is made of (5) (h, w) and μ before the contour is moved.
+    least : bool
+        Whether μ goes to where (3) is least near it, and not down its gradient (5) for some steps.
     """
     base, velocities, seen = _next_window(state, new, window, group)
     edges = edges_of(state.shape)
@@ -229,7 +233,10 @@ def updated(
         edges, own, base, velocities, seen, gains.motion, group, steps, reach, robust, free
     )
     every = poses(base, velocities, group)
-    shape = corrected_shape(state.shape, every, seen, gains.shape, steps, curvature, force)
+    if least:
+        shape = towards_least(state.shape, every[-1:], seen[-1:], gains.shape, reach, force)
+    else:
+        shape = corrected_shape(state.shape, every, seen, gains.shape, steps, curvature, force)
     expected = motion(velocities)
     after = State(shape, base, velocities, seen, expected, expected - velocities[-1])
     return gauged(after, group=group)
@@ -249,7 +256,7 @@ def own_pull(shape: Float, edges: Float, reach: int) -> Float:
     wide = cv2.blur(
         1 - 2 * levelset.inside(shape), (2 * reach + 1, 2 * reach + 1), borderType=cv2.BORDER_REPLICATE
     )
-    return levelset.sample(wide, (edges[:, :2] + edges[:, 2:]) / 2 + _about(shape.shape)[:2, 2])
+    return levelset.sample(wide, (edges[:, :2] + edges[:, 2:]) / 2 + about(shape.shape)[:2, 2])
 
 
 def corrected_velocities(
@@ -332,6 +339,37 @@ def corrected_shape(
     return levelset.blend(shape, flowed, gain)
 
 
+def towards_least(
+    shape: Float,
+    every: Float,
+    seen: Sequence[Measured],
+    gain: float,
+    reach: int,
+    force: Callable[[Float, Float], Float] | None = None,
+) -> Float:
+    """Return μ ⊕ L_μ of the shape near it for which (3) is least: what (5) comes to when parts may also appear and vanish.
+
+    That is where f_in < f_out within reach, as far as it hangs together with μ. Distances are cut off, so that thin
+    parts count as much as thick ones.
+    """
+    if gain <= 0:
+        return shape
+    push = shape_gradient(shape, every, seen)
+    if force is not None:
+        push = force(push, shape)
+    push = np.where(shape < reach, push, np.maximum(push, 0.1))
+    inside = (push < 0).astype(np.uint8)
+    count, labels = cv2.connectedComponents(inside, connectivity=8)
+    hangs = np.zeros(count, np.bool_)
+    hangs[np.unique(labels[shape < 0])] = True
+    hangs[0] = False
+    push = np.where(hangs[labels] | (push >= 0), push, 0.1)
+    if not (push < 0).any():
+        return shape
+    found = levelset.redistance(push)
+    return levelset.blend(np.clip(shape, -_CUT, _CUT), np.clip(found, -_CUT, _CUT), gain)
+
+
 def settled_shape(state: State, one: Measured, curvature: float, group: lie.Group, steps: int = 60) -> State:
     """Return the state whose μ is steady under (5) of one frame (§III: the initialisation phase)."""
     pose = pose_of(state, group)[None]
@@ -345,11 +383,11 @@ def settled_shape(state: State, one: Measured, curvature: float, group: lie.Grou
 def gauged(state: State, *, group: lie.Group) -> State:
     """Return the same contour with its centroid at μ's origin: (g h⁻¹, h μ) is as good as (g, μ)."""
     there = levelset.moments(state.shape)
-    off = there.centroid - _about(state.shape.shape)[:2, 2]
+    off = there.centroid - about(state.shape.shape)[:2, 2]
     need = _fitting(state.shape)
     if np.abs(off).max() <= _ABOUT and _fits(state.shape.shape, need):
         return state
-    moved = _about(need) @ _shift(-off) @ lie.inverse(_about(state.shape.shape))
+    moved = about(need) @ _shift(-off) @ lie.inverse(about(state.shape.shape))
     shape = levelset.redistance(levelset.carried(state.shape, moved, need))
     base = state.base @ _shift(off)
     if len(state.velocities):
@@ -431,7 +469,7 @@ def _seen_from(there: Float, field: NDArray[np.float32], shape: tuple[int, int])
     )
 
 
-def _about(shape: tuple[int, int]) -> Float:
+def about(shape: tuple[int, int]) -> Float:
     """From coordinates about the origin to columns and rows of μ's picture."""
     return _shift(np.array([(shape[1] - 1) / 2, (shape[0] - 1) / 2]))
 

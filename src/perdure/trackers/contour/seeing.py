@@ -184,22 +184,23 @@ def moved_on(place: Place, grey: NDArray[np.uint8], step: int, things: Bits) -> 
     camera = camera.copy()
     camera[:, 2] *= step
     if np.array_equal(camera, np.eye(2, 3)):
-        return Place(place.colours, place.known, grey, step), camera
+        return Place(place.colours, place.known, place.covered, grey, step), camera
     size = (place.known.shape[1], place.known.shape[0])
     colours = cv2.warpAffine(place.colours, camera, size)
     known = cv2.warpAffine(place.known.view(np.uint8), camera, size, flags=cv2.INTER_NEAREST).astype(np.bool_)
-    return Place(np.asarray(colours, np.uint8), known, grey, step), camera
+    covered = cv2.warpAffine(place.covered.view(np.uint8), camera, size, flags=cv2.INTER_NEAREST).astype(np.bool_)
+    return Place(np.asarray(colours, np.uint8), known, covered, grey, step), camera
 
 
-def learnt_place(place: Place, colours: NDArray[np.uint8], things: Bits, rate: float) -> Place:
-    """Return the place with what is seen of it now, things (H, W) being before the rest."""
+def learnt_place(place: Place, colours: NDArray[np.uint8], things: Bits, covered: Bits, rate: float) -> Place:
+    """Return the place with what is seen of it now, things (H, W) being before the rest; some are seen at `covered`."""
     free = ~things
     mixed = cv2.addWeighted(place.colours, 1 - rate, colours, rate, 0)
     fresh = free & ~place.known
     out = place.colours.copy()
     out[free] = mixed[free]
     out[fresh] = colours[fresh]
-    return Place(out, place.known | free, place.grey, place.step)
+    return Place(out, place.known | free, place.covered | covered, place.grey, place.step)
 
 
 def velocity_by_flow(

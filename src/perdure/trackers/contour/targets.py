@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from perdure.maths.mixture import Mixture
 from perdure.trackers.contour.observer import State
+from perdure.trackers.contour.recalling import Shape
 from perdure.types import Mask
 
 
@@ -47,6 +48,11 @@ class Target:
     visible: float  # share of the usual support that is there
     usual: float  # square pixels that look like it, in its silhouette and near it
     steady: NDArray[np.float64]  # (D,) velocity of late while it was seen whole
+    past: tuple[Shape, ...]  # shapes that were seen in full
+    recalled: int  # while it is hidden: how old it was when it had the shape that it has now; -1: it is rigid
+    restless: float  # share of its outline that is another in every frame, of late
+    drift: NDArray[np.float64]  # (2,) px by which it was found off its path since it is hidden
+    age: int  # frames since it was found
     frames: int  # in which it was measured
     missed: float  # s for which it was not seen
     born: float  # s
@@ -62,5 +68,8 @@ class Place:
 
     colours: NDArray[np.uint8]  # (H, W, 3) Lab
     known: NDArray[np.bool_]  # (H, W)
+    covered: NDArray[
+        np.bool_
+    ]  # (H, W) a target has been seen there: nothing that stands there comes before targets
     grey: NDArray[np.uint8]  # (h, w) of the frame before, smaller by `step`
     step: int

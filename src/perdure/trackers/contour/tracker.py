@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.masks import mask_overlaps, mask_shares, silhouettes
-from perdure.maths import lie
+from perdure.maths import levelset, lie
 from perdure.maths.mixture import log_density
 from perdure.params import Schedule, parameter
-from perdure.trackers.contour import observer
+from perdure.trackers.contour import observer, recalling
 from perdure.trackers.contour.measuring import Measured, measured, of_evidence
 from perdure.trackers.contour.observer import Gains, State
 from perdure.trackers.contour.saying import gone, happenings, has_left, rows_of
@@ -45,6 +45,13 @@ _MORE, _LESS = 0.2, 0.015  # rates at which the usual support follows what is se
 _FAR, _BETTER = 0.1, 0.05  # what the farthest shift must gain more, and any, of 2 between all wrong and all right
 _COVERED, _SAME = 0.2, 0.3
 _MARKED = 0.5
+_AGO = 8  # frames ago, with which what is seen is compared
+_DEGREES = {"position": 0, "velocity": 1, "acceleration": 2}
+_RESTLESS = 0.12  # share of an outline that is another in every frame, from which it is
+_MISSING = 0.15  # what a pixel of a silhouette counts that does not look like it, beside one that does
+_STRAY = 0.03  # what the farthest shift must cover more, of all
+_DRIFT = 0.4  # rate at which the path of a hidden object follows what is seen of it
+_SOLID = 5  # cells across, from which a part is one
 _SMOOTH = 3  # cells across which evidence is averaged
 _EDGE = 0.8  # |f_in - f_out| averaged over the reach, from which there is no edge within it
 _TELLING = 0.35  # share seen from which flow tells how the whole moves
@@ -78,6 +85,16 @@ class _Seen(NamedTuple):
     pose: Float  # where it should be
     depth: Float  # (h, w) cells, signed distances of the silhouette there
     known: Bits
+    expected: _Expected | None
+    covered: Bits  # (h, w) where an object has been seen before
+
+
+class _Expected(NamedTuple):
+    """What an object should be like in a frame, by its past."""
+
+    shape: Float  # μ
+    pose: Float  # (3, 3)
+    recalled: int  # how old it was when it had that shape; -1: now
 
 
 @dataclass(frozen=True)
@@ -135,7 +152,13 @@ class Contour:
 
     def start(self, scene: Scene) -> ContourState:
         """Return the state without an object."""
-        none = Place(np.zeros((0, 0, 3), np.uint8), np.zeros((0, 0), np.bool_), np.zeros((0, 0), np.uint8), 1)
+        none = Place(
+            np.zeros((0, 0, 3), np.uint8),
+            np.zeros((0, 0), np.bool_),
+            np.zeros((0, 0), np.bool_),
+            np.zeros((0, 0), np.uint8),
+            1,
+        )
         return ContourState((), (), none, none.grey, 1, self.reserved + 1, 0.0, (scene.height, scene.width))
 
     def step(self, state: ContourState, frame: Frame, regions: Regions) -> tuple[ContourState, Report]:
@@ -144,7 +167,8 @@ class Contour:
             return replace(state, time=frame.time), Report()
         lab = lab_of(frame.image)
         grey, step = small_grey(frame.image)
-        place = Place(lab, np.zeros(lab.shape[:2], np.bool_), grey, step)
+        nothing = np.zeros(lab.shape[:2], np.bool_)
+        place = Place(lab, nothing, nothing, grey, step)
         if state.place.grey.shape == grey.shape:
             place, _ = moved_on(state.place, grey, step, self._things(state.targets, state.size))
         light = np.asarray(cv2.cvtColor(np.ascontiguousarray(frame.image), cv2.COLOR_RGB2GRAY), np.uint8)
@@ -152,7 +176,8 @@ class Contour:
         waited = frame.time - state.time
         targets = self._updated(state.targets, sights, self._gains_of(frame.index), waited)
         targets, born, waiting, events = self._born(state, targets, frame, lab, place, regions)
-        place = learnt_place(place, lab, self._things(targets, state.size), _PLACE_RATE)
+        covered = np.any([nothing, *(one.seen.to_image(*state.size) for one in targets)], axis=0)
+        place = learnt_place(place, lab, self._things(targets, state.size), covered, _PLACE_RATE)
         kept, believed = [], []
         for one in targets:
             whole = self._silhouette(one)
@@ -188,13 +213,39 @@ class Contour:
             return self.gained(index)
         return Gains(Schedule(self.shape_gain).at(index), Schedule(self.motion_gain).at(index))
 
+    def _expectation(self, target: Target) -> _Expected | None:
+        """Return which shape an object should have, and where it should be, by what is known of its past."""
+        past = target.past
+        if self.gains == "constant" or len(past) < _AGO or target.restless < _RESTLESS:
+            return None
+        seen = target.visible >= _WHOLE
+        before = target.recalled
+        if seen:
+            again = recalling.recalled(past)
+            before = -1 if again is None else past[again].age
+        age = -1 if before < 0 else recalling.following(past, before)
+        now = recalling.nearest(past, age) if age >= 0 else len(past) - 1
+        shape = recalling.drawn(past[now]) if age >= 0 else target.state.shape
+        pose = observer.pose_of(target.state, self._group).copy()
+        if self.moved is None:
+            place = recalling.place(past, target.age + 1, age, _DEGREES[self.motion])
+        else:
+            place = pose[:2, 2] + self.moved(target.state.velocities)[:2] - target.drift
+        pose[:2, 2] = place + (0.0 if seen else target.drift)
+        return _Expected(shape, pose, age)
+
     # Measuring ----------------------------------------------------------------------------------------------
 
     def _look(self, target: Target, edge: float, lab: NDArray[np.uint8], place: Place) -> _Seen:
         """Return what a frame shows round where an object is expected: first by colours anywhere, then at their places."""
         weights = Weights(self.place, self.trust, self.bound)
         size = (lab.shape[0], lab.shape[1])
+        expected = self._expectation(target)
         pose = observer.predicted(target.state, self._group)
+        hidden = target.visible < _WHOLE and expected is not None
+        if hidden and expected is not None:
+            target = replace(target, state=replace(target.state, shape=expected.shape))
+            pose = expected.pose
         ring = self.ring + self._searched(target) - self.search
         window = window_round(target.state.shape, pose, ring, self.cells)
         colours = window.cut(lab).astype(np.float32)
@@ -203,10 +254,12 @@ class Contour:
         outside = depth > self.reach
         plain = evidence(window, colours, target.looks, place, outside, None, weights)
         one = self._measured(window, plain, inside)
-        if self.gains == "automatic":
+        if self.gains == "automatic" and not hidden:
             pose = pose + self._shifted(target, one, depth)
         state = observer.towards(target.state, pose, self._group)
-        if target.missed == 0 or _support(depth, one, self.reach) >= _HIDDEN * target.usual:
+        if hidden:
+            pass
+        elif target.missed == 0 or _support(depth, one, self.reach) >= _HIDDEN * target.usual:
             found = self._registered(state, one, edge, target.visible >= _WHOLE)
             near = self.reach / 2 * window.step if target.visible < _WHOLE else np.inf
             pose = found if np.abs(found[:2, 2] - pose[:2, 2]).max() <= near else pose
@@ -214,7 +267,8 @@ class Contour:
         depth = window.drawn(target.state.shape, pose)
         full = evidence(window, colours, target.looks, place, depth > self.reach, pose, weights)
         smooth = np.asarray(cv2.blur(full, (_SMOOTH, _SMOOTH)), np.float32)
-        return _Seen(window, colours, smooth, state, edge, pose, depth, inside)
+        covered = window.cut(place.covered.view(np.uint8)).astype(np.bool_)
+        return _Seen(window, colours, smooth, state, edge, pose, depth, inside, expected, covered)
 
     def _moved(self, target: Target, before: NDArray[np.uint8], now: NDArray[np.uint8]) -> tuple[Target, float]:
         """Return an object with the velocity that what is seen of it has had, and how far from the contour edges are its own.
@@ -277,14 +331,31 @@ class Contour:
         )
         return observer.pose_of(after, self._group)
 
-    def _observed(self, state: State, one: Measured, gains: Gains, edge: float, whole: bool = True) -> State:
+    def _observed(
+        self, state: State, one: Measured, gains: Gains, edge: float, whole: bool = True, *, least: bool = False
+    ) -> State:
         automatic = self.gains == "automatic"
         return observer.updated(
             state, one, gains, self._group,
             window=self.window, steps=self.iterations, motion=self._motion, reach=self.reach,
             curvature=self.curvature, robust=edge if automatic else 2.0,
-            force=(self._slower if whole else self._heard) if automatic else None, free=6 if whole or not automatic else 2,
+            force=self._force(whole, least) if automatic else None, free=6 if whole or not automatic else 2,
+            least=automatic and whole and least,
         )  # fmt: skip
+
+    def _force(self, whole: bool, least: bool) -> Callable[[Float, Float], Float] | None:
+        """Return what is made of (5)."""
+        if whole and least:
+            return None
+        return self._slower if whole else self._heard
+
+    def _changed(self, sight: _Seen, one: Measured) -> float:
+        """Return which share of an outline is another in this frame: 1 - IoU of μ and what looks like it."""
+        pose = observer.pose_of(observer.coasted(sight.state, one, self._group, window=1), self._group)
+        shape = sight.state.shape
+        found = observer.towards_least(shape, pose[None], [one], 1.0, self.reach)
+        was, now = shape < 0, found < 0
+        return 1 - float((was & now).sum()) / max(float((was | now).sum()), 1.0)
 
     def _heard(self, push: Float, shape: Float) -> Float:
         """Return (5) of an object that is partly hidden: where nothing within reach looks like it, μ is rigid."""
@@ -330,12 +401,15 @@ class Contour:
         one = self._measured(sight.window, sight.evidence, known)
         area = _support(sight.depth, one, self.reach)
         visible = min(1.0, area / max(target.usual, 1.0))
+        if sight.expected is not None:
+            visible, place = self._placed(target, sight.expected, sight, one)
+            if visible < _WHOLE:
+                return self._hidden(target, sight.expected, sight, one, place, visible, gains.shape, waited)
         state, group = sight.state, self._group
+        share = 1.0
         if self.gains == "automatic":
             share = min(max((visible - _FROZEN) / (_WHOLE - _FROZEN), 0.0), 1.0)
             gains = Gains(gains.shape * share, gains.motion * visible)
-        else:
-            share = 1.0
         if visible < _HIDDEN and self.gains == "automatic":
             blank = measured(np.zeros((1, 1)), 0)
             state = observer.coasted(
@@ -346,11 +420,25 @@ class Contour:
             )
             state = self._steadied(state, target.steady, 0.0)
             return replace(
-                target, state=state, seen=Mask.empty(), visible=visible, missed=target.missed + waited, links=()
+                target,
+                state=state,
+                seen=Mask.empty(),
+                visible=visible,
+                missed=target.missed + waited,
+                links=(),
+                age=target.age + 1,
             )
-        state = self._observed(state, one, gains, sight.edge, visible >= _WHOLE)
-        steady = target.steady
+        restless, least = target.restless, target.restless >= _RESTLESS
         if visible >= _WHOLE:
+            restless = restless + max(_STEADY, 1 / (target.frames + 1)) * (self._changed(sight, one) - restless)
+        state = self._observed(state, one, gains, sight.edge, visible >= _WHOLE, least=least)
+        steady, past = target.steady, target.past
+        if visible >= _WHOLE:
+            at = observer.pose_of(state, group)[:2, 2]
+            raw = state.shape
+            if sight.expected is not None:
+                state = self._holding(target, state, sight, one)
+            past = recalling.kept(past, raw, target.age + 1, at)
             steady = steady + max(_STEADY, 1 / (target.frames + 1)) * (state.velocities[-1] - steady)
         state = self._steadied(state, steady, share)
         pose = observer.pose_of(state, group)
@@ -369,10 +457,91 @@ class Contour:
             visible=visible,
             usual=usual,
             steady=steady,
+            past=past,
+            recalled=-1,
+            restless=restless,
+            drift=np.zeros(2),
+            age=target.age + 1,
             missed=0.0,
             frames=target.frames + 1,
             links=(),
         )
+
+    def _placed(self, target: Target, expected: _Expected, sight: _Seen, one: Measured) -> tuple[float, Float]:
+        """Return which share of an object is seen, and where (3, 3) what is seen lies in the shape that it should have."""
+        poses = [expected.pose]
+        if target.visible >= _WHOLE:
+            poses.append(sight.pose)
+        best: tuple[float, Float] = (-1.0, expected.pose)
+        for pose in poses:
+            depth = sight.window.drawn(expected.shape, pose)
+            near = self._searched(target) / 2 + 1
+            x, y = covering(depth, one.pull, int(near / one.step), self.reach)
+            moved = pose.copy()
+            moved[:2, 2] += np.array([x, y]) * one.step
+            depth = sight.window.drawn(expected.shape, moved)
+            was, now = depth < 0, (one.pull < 0) & (depth < self.reach)
+            vacated = sight.covered & (one.pull > 0)
+            change = float(solid(was & ~now & ~vacated).sum()) - float(solid(now & ~was).sum())
+            share = float(np.clip(1 - change / max(was.sum(), 1), 0.0, 1.0))
+            if expected.recalled < 0:
+                share = max(share, min(1.0, _support(depth, one, self.reach) / max(target.usual, 1.0)))
+            if share > best[0] + 0.02:
+                best = share, moved
+        return best
+
+    def _holding(self, target: Target, state: State, sight: _Seen, one: Measured) -> State:
+        """Return a state whose μ keeps for some frames what has gone where nothing has ever been seen: what stands there may hide it."""
+        pose = observer.pose_of(state, self._group)
+        return self._with_parts(state, sight, self._gone(recalling.drawn(target.past[-_AGO]), pose, sight, one))
+
+    def _gone(self, shape: Float, pose: Float, sight: _Seen, one: Measured) -> Bits:
+        """Return which cells (h, w) of μ do not look like the object any more, but may be hidden."""
+        before = sight.window.drawn(shape, pose) < 0
+        return solid(before & (one.pull >= 0) & ~(sight.covered & (one.pull > 0)))
+
+    def _with_parts(self, state: State, sight: _Seen, parts: Bits) -> State:
+        """Return a state whose μ holds parts (h, w), too."""
+        if not parts.any():
+            return state
+        window, pose = sight.window, observer.pose_of(state, self._group)
+        there = observer.about(state.shape.shape) @ lie.inverse(pose) @ lie.inverse(window.to_cells())
+        kept = levelset.carried(levelset.signed_distance(parts), there, state.shape.shape)
+        shape = levelset.redistance(np.minimum(state.shape, kept))
+        return observer.gauged(replace(state, shape=shape), group=self._group)
+
+    def _hidden(
+        self,
+        target: Target,
+        expected: _Expected,
+        sight: _Seen,
+        one: Measured,
+        place: Float,
+        visible: float,
+        gain: float,
+        waited: float,
+    ) -> Target:
+        """Return an object that is partly or wholly hidden: μ is what it should be, where what is seen fits into it."""
+        gone = visible < _HIDDEN
+        pose = expected.pose if gone else place
+        state = replace(target.state, shape=expected.shape)
+        state = observer.towards(state, pose, self._group)
+        state = observer.coasted(state, measured(np.zeros((1, 1)), 0), self._group, window=self.window)
+        if expected.recalled < 0 and visible >= _TELLING:
+            parts = self._gone(expected.shape, pose, sight, one)
+            shape = observer.towards_least(state.shape, pose[None], [one], gain, self.reach)
+            state = self._with_parts(replace(state, shape=shape), sight, parts)
+        pose = observer.pose_of(state, self._group)
+        depth = sight.window.drawn(state.shape, pose)
+        seen = Mask.empty() if gone else self._mask(sight.window, (depth < 0) & (one.pull < 0))
+        drift = (np.zeros(2) if target.visible >= _WHOLE else target.drift) + (
+            0.0 if gone else _DRIFT * (place[:2, 2] - expected.pose[:2, 2])
+        )
+        return replace(
+            target, state=state, seen=seen, visible=visible, recalled=expected.recalled, drift=drift,
+            usual=target.usual * (1 - _LESS) if visible > 0.5 else target.usual,
+            missed=target.missed + waited if gone else 0.0, links=(), age=target.age + 1,
+        )  # fmt: skip
 
     def _steadied(self, state: State, steady: Float, share: float) -> State:
         """Return the state with a prediction that is the steadier, the less is seen; it turns and grows by half at most."""
@@ -494,10 +663,37 @@ class Contour:
             depth = window.drawn(state.shape, pose)
         layer = learnt_layer(None, window, colours, (depth < -0.5) & within, pose, 1.0)
         return Target(
-            key, identity, state, Looks(inner, outer, inner, outer, layer), mask, 1.0, float(mask.area), np.zeros(self._group.dimension), 1, 0.0, frame.time,
+            key, identity, state, Looks(inner, outer, inner, outer, layer), mask, 1.0, float(mask.area), np.zeros(self._group.dimension), (), -1, 2 * _RESTLESS, np.zeros(2), 0, 1, 0.0, frame.time,
             float(regions.scores[row]), str(regions.classes[row]), (row,),
             bool(regions.data["mark"][row]) if "mark" in regions.data else False,
         )  # fmt: skip
+
+
+def covering(depth: Float, pull: Single, most: int, reach: int) -> tuple[int, int]:
+    """Return the shift (x, y), of at most so many cells, at which a silhouette covers most of what looks like it.
+
+    What of it does not look like it counts little: it may be hidden.
+    """
+    most = max(most, 1)
+    inside = (depth < 0).astype(np.float32)
+    rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+    if not len(rows):
+        return 0, 0
+    part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    gain = np.where(pull < 0, -pull, np.float32(-_MISSING) * pull) * (depth < most + reach)
+    field = cv2.copyMakeBorder(gain.astype(np.float32), most, most, most, most, cv2.BORDER_CONSTANT, value=0)
+    field = field[part[0].start : part[0].stop + 2 * most, part[1].start : part[1].stop + 2 * most]
+    sums = cv2.matchTemplate(field, np.ascontiguousarray(inside[part]), cv2.TM_CCORR) / float(inside.sum())
+    y, x = np.mgrid[-most : most + 1, -most : most + 1]
+    sums = sums - _STRAY * (x**2 + y**2) / most**2
+    best = np.unravel_index(int(np.argmax(np.round(sums, 4) - 1e-9 * (x**2 + y**2))), sums.shape)
+    return int(x[best]), int(y[best])
+
+
+def solid(bits: Bits) -> Bits:
+    """Return what of bits (h, w) is more than some cells thick."""
+    brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_SOLID, _SOLID))
+    return np.asarray(cv2.morphologyEx(bits.astype(np.uint8), cv2.MORPH_OPEN, brush)) > 0
 
 
 def _share(depth: Float, one: Measured, reach: int) -> float:
