@@ -7,8 +7,7 @@ binary      a drawn shape that moves by a constant velocity, measured as it is, 
             at rest: the errors of place (px) and velocity (px/frame), by gain, one for motion and shape. The envelope
             decays if the largest error of place in ten frames is no larger than that in the ten before, or below FLAT.
 figures     section IV on drawn-together clips, a row a gain: Fig. 1 on attractive, Fig. 2 on whiteband (gains that
-            are low at first and rise when the object has been followed for LOW frames, and the same ones from the
-            first frame on), Fig. 3 on turning, and behind2 (two objects, of which one is hidden by the other, twice)
+            are low at first and rise when the object has been followed for LOW frames), Fig. 3 on turning, and behind2 (two objects, of which one is hidden by the other, twice)
             with the gains of Fig. 2. Beside them the tracker's defaults, `automatic`. Objects are marked on their
             first full frame, as `perdure track --init` does. IoU is of whole silhouettes, what is believed with
             gt/amodal.txt, in frames after the mark in which the truth does not touch the picture's border.
@@ -23,7 +22,7 @@ fall        cdnet-fall, a truck that passes behind a tree, marked in the first f
 
 The data is read from $PERDURE_DATA or ../shared/data beside the repository; what is not there is left out with a note.
 --draw writes a figure per clip, a row a gain, with the IoU of each frame beside it; --write puts the tables into
-docs/contour-observer.md, and leaves those of other parts there; --json prints everything, with the IoU of each frame,
+docs/contour-observer.md, and leaves the others there; --json prints everything, with the IoU of each frame,
 as one object in the last line.
 """
 
@@ -265,7 +264,7 @@ class Figure(NamedTuple):
     settings: tuple[Setting, ...]
 
 
-_HIDDEN = tuple(constant(one, 0.3, "acceleration", rising=low) for low in (True, False) for one in (0.1, 0.5, 0.8))
+_HIDDEN = tuple(constant(one, 0.3, "acceleration", rising=True) for one in (0.1, 0.5, 0.8))
 FIGURES = {
     "attractive": Figure("Fig. 1", tuple(constant(one, 0.3) for one in (0.1, 0.65, 0.7))),
     "whiteband": Figure("Fig. 2", _HIDDEN),
@@ -710,24 +709,18 @@ def strip_tile(frame: Frame, rows: Tracks) -> Image:
 
 
 def section(command: str, result: Result, page: str = "") -> str:
-    """Return what stands between the marks in docs/contour-observer.md; tables of parts that were not run stay."""
-    written = tables_on(page)
-    for part in PARTS:
-        if part in result.told:
-            written[part] = [markdown(one) for one in result.tables if one.title.startswith(f"{part}:")]
+    """Return what stands between the marks in docs/contour-observer.md; tables that were not made anew stay."""
+    written = tables_on(page) | {one.title: markdown(one) for one in result.tables}
     told = ", ".join(f"{name} {version}" for name, version in result.told["versions"].items())
-    tables = [table for part in PARTS for table in written.get(part, ())]
+    tables = [table for part in PARTS for title, table in written.items() if title.startswith(f"{part}:")]
     return "\n\n".join([f"`{command}`", *tables, f"Versions: {told}."])
 
 
-def tables_on(page: str) -> dict[str, list[str]]:
-    """Return the tables that a page has between our marks, by part."""
-    found: dict[str, list[str]] = {}
+def tables_on(page: str) -> dict[str, str]:
+    """Return the tables that a page has between our marks, by title."""
     blocks = page.partition(BEGIN)[2].partition(END)[0].strip().split("\n\n")
-    for title, table in itertools.pairwise(blocks):
-        if title.startswith("**"):
-            found.setdefault(title[2:].partition(":")[0], []).append(f"{title}\n\n{table}")
-    return found
+    pairs = itertools.pairwise(blocks)
+    return {title.strip("*"): f"{title}\n\n{table}" for title, table in pairs if title.startswith("**")}
 
 
 def replaced(page: str, inside: str) -> str:

@@ -11,7 +11,7 @@ import pytest
 from perdure import states
 from perdure.fold import settle
 from perdure.maths import levelset, lie
-from perdure.trackers.contour import Contour, ContourState
+from perdure.trackers.contour import Contour, ContourState, recalling
 from perdure.trackers.contour import observer as paper
 from perdure.trackers.contour.measuring import Measured, measured, of_distance, of_evidence, of_shape
 from perdure.trackers.contour.observer import Gains, State
@@ -200,6 +200,58 @@ def test_every_measurement_says_inside_where_the_object_is():
     likely = of_evidence(np.where(shape, 3.0, -3.0), np.ones(shape.shape, bool), reach=0)
     assert np.array_equal(likely.pull < 0, shape)
     assert not of_evidence(np.where(shape, 3.0, -3.0), np.zeros(shape.shape, bool), reach=0).pull.any()
+
+
+def walking(frame: int) -> np.ndarray:
+    """μ (61, 61) of a body that leans to and fro, the same again after 12 frames."""
+    y, x = np.mgrid[-30:31, -30:31]
+    lean = 12 * np.sin(frame * np.pi / 6)
+    return levelset.signed_distance((x - lean * y / 30) ** 2 / 64 + y**2 / 484 < 1)
+
+
+def walked(shape: Callable[[int], np.ndarray], count: int) -> tuple[recalling.Shape, ...]:
+    past: tuple[recalling.Shape, ...] = ()
+    for frame in range(count):
+        past = recalling.kept(past, shape(frame), frame, np.array([3.0 * frame + frame % 12, 5.0]))
+    return past
+
+
+def test_a_gait_is_recalled_and_what_came_after():
+    past = walked(walking, 40)
+    again = recalling.recalled(past)
+    assert again is not None
+    assert (39 - past[again].age) % 12 == 0
+    age = past[again].age
+    for frame in range(40, 60):
+        age = recalling.following(past, age)
+        shape = recalling.drawn(past[recalling.nearest(past, age)])
+        assert ((shape < 0) ^ (walking(frame) < 0)).sum() < 0.02 * (walking(frame) < 0).sum()
+        place = recalling.place(past, frame, age, 1)
+        assert place == pytest.approx([3.0 * frame + frame % 12, 5.0])
+
+
+def test_what_does_not_come_back_is_not_recalled():
+    still = walked(lambda _: walking(1), 40)
+    assert recalling.recalled(still) is None
+    assert recalling.recalled(walked(walking, 8)) is None
+    assert recalling.following(still, 39) == 39
+    straight_on = walked(lambda _: walking(1), 12)
+    assert recalling.place(straight_on, 14, -1, 1) == pytest.approx([56.0, 5.0])
+    assert recalling.place(straight_on, 14, -1, 0) == pytest.approx([44.0, 5.0])
+    assert len(walked(lambda _: walking(1), 100)) == recalling.MOST
+
+
+def test_parts_may_vanish_and_appear_where_the_energy_is_least():
+    group, there = lie.SE2, egg(80, 80)
+    ring = there & ~cv2.erode(there.astype(np.uint8), np.ones((13, 13), np.uint8)).astype(bool)
+    state = paper.initial(there, 0, 0, group)
+    pose = paper.pose_of(state, group)
+    one = of_shape(ring)
+    found = paper.towards_least(state.shape, pose[None], [one], 1.0, 8)
+    assert paper.discrepancy(found, pose, one) < 0.12 * ring.sum()
+    assert paper.towards_least(state.shape, pose[None], [one], 0.0, 8) is state.shape
+    nothing = of_shape(np.zeros_like(there))
+    assert paper.towards_least(state.shape, pose[None], [nothing], 1.0, 8) is state.shape
 
 
 @pytest.mark.parametrize("step", [1, 2])
