@@ -479,10 +479,9 @@ def figure_tables(rows: Sequence[Watched]) -> list[Table]:
         for one in rows:
             if one.clip != clip:
                 continue
-            everyone = sorted({row.object for row in one.readings})
             same = ", ".join(str(number) for number in one.kept()) or "none"
             values = [_cell(value) for value in (one.free, one.partly, one.hidden)]
-            cells.append([one.setting, *values, _slowest(one), f"{same} of {len(everyone)}"])
+            cells.append([one.setting, *values, _slowest(one), same])
         title = f"figures: {clip} ({FIGURES[clip].title}), mean IoU of whole silhouettes, by gain"
         head = [
             "gain",
@@ -490,7 +489,7 @@ def figure_tables(rows: Sequence[Watched]) -> list[Table]:
             "partly hidden",
             "hidden",
             f"{AGAIN:g} again after, frames",
-            "same target",
+            "same target, ids",
         ]
         tables.append(Table(title, head, cells))
     return tables
