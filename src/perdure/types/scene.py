@@ -20,12 +20,14 @@ class Scene:
         Pixels.
     fps : float
         Nominal frames per second; times come with the frames.
-    zones : tuple
-        Polygons with a kind.
+    zones : tuple of Zone
+        Polygons with a kind and a name (`perdure.scene.zones`).
     ground : object or None
         The ground plane.
     roi : (H, W) bool array or None
         True where something may be seen; None for everywhere.
+    rules : tuple of Rule
+        Who is lost in which zone may be found again in which (`perdure.scene.zones`).
     """
 
     width: int
@@ -34,6 +36,7 @@ class Scene:
     zones: tuple[Any, ...] = ()
     ground: Any = None
     roi: Bits | None = None
+    rules: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
         if self.roi is not None:
