@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from perdure.detect.components import components
+from perdure.scene.zones import Rule, Zone
 from perdure.types import Frame, Regions, Scene, Tracks
 
 Path = Callable[[int], "tuple[int, int] | None"]
@@ -31,10 +32,12 @@ class World:
     width: int = 120
     height: int = 80
     fps: float = 10.0
+    zones: tuple[Zone, ...] = ()
+    rules: tuple[Rule, ...] = ()
 
     @property
     def scene(self) -> Scene:
-        return Scene(self.width, self.height, self.fps)
+        return Scene(self.width, self.height, self.fps, zones=self.zones, rules=self.rules)
 
     def frames(self) -> list[Frame]:
         return [Frame(k, k / self.fps, self._picture(k)) for k in range(self.count)]

@@ -79,8 +79,21 @@ def near(regions: Boxes, targets: Boxes, farthest: float, size_ratio: float) -> 
     return Near(region, target, every[region, target], alike)
 
 
+class Place(NamedTuple):
+    """What zones change in the matrix."""
+
+    reach: NDArray[np.float64]  # (T,) times the distance up to which a region may be the target
+    forbidden: NDArray[np.bool_]  # (T, R) what a rule forbids
+
+
 def match(
-    regions: Boxes, scores: Float, targets: Boxes, whole: NDArray[np.bool_], cost: Float, limits: Thresholds
+    regions: Boxes,
+    scores: Float,
+    targets: Boxes,
+    whole: NDArray[np.bool_],
+    cost: Float,
+    limits: Thresholds,
+    place: Place | None = None,
 ) -> Matched:
     """Find visible, ambiguous and lost targets.
 
@@ -98,21 +111,29 @@ def match(
         Added to the distance of targets that should come second.
     limits : Thresholds
         What makes a correspondence.
+    place : Place or None
+        What zones change.
     """
     sure = scores >= limits.sure
     weak = (scores >= limits.least) & ~sure
-    entries = near(regions, targets, limits.distance, limits.size_ratio)
+    farthest = limits.distance if place is None else limits.distance * float(place.reach.max(initial=1.0))
+    entries = near(regions, targets, farthest, limits.size_ratio)
     allowed = entries.alike | whole[entries.target]
+    if place is not None:
+        allowed &= entries.distance < limits.distance * place.reach[entries.target]
+        allowed &= ~place.forbidden[entries.target, entries.region]
     worth = entries.distance + cost[entries.target]
     taken = np.full(len(regions), -1, np.intp)  # target of each region
-    _one_to_one(taken, entries, worth, allowed & sure[entries.region], limits.distance + 1)
+    _one_to_one(taken, entries, worth, allowed & sure[entries.region], farthest + 1)
     if weak.any():
         late = allowed & weak[entries.region] & (entries.distance < limits.second_distance)
-        _one_to_one(taken, entries, worth, late & ~np.isin(entries.target, taken[taken >= 0]), limits.distance + 1)
+        _one_to_one(taken, entries, worth, late & ~np.isin(entries.target, taken[taken >= 0]), farthest + 1)
     edges = [
         *_merges(regions, targets, taken, limits),
         *_splits(regions, sure, targets, whole, taken, limits),
     ]
+    if place is not None:
+        edges = [edge for edge in edges if not place.forbidden[edge]]
     return _knotted(taken, edges)
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.appearance import alike, signature
-from perdure.trackers.compound.targets import CENTRE, Float, Targets
-from perdure.types import Event, Frame, Renamed
+from perdure.scene.zones import Zones
+from perdure.trackers.compound.targets import CENTRE, Float, Targets, around
+from perdure.types import Boxes, Event, Frame, Renamed
 
 Index = NDArray[np.intp]
 _COMPARED = 1.0  # s of age, up to which a new target is compared
@@ -43,6 +44,7 @@ def recall(
     confirm: float,
     least: float,
     now: Callable[[int], Float],
+    zones: Zones,
 ) -> Found:
     """Give young targets the identities of suspended ones, or of members of a compound, that they look like.
 
@@ -64,6 +66,8 @@ def recall(
         Similarity from which two looks are of one thing, in [0, 1].
     now : function
         Signature of what is seen where a member of a compound is believed.
+    zones : Zones
+        Who comes in by an entry is new, and rules may forbid who may be found where.
     """
     region, events, renamed, keys = region.copy(), [], [], {}
     young, old = _young(targets, region, frame.time, size, confirm), _missing(targets, region, motion, size)
@@ -72,7 +76,7 @@ def recall(
         likeness = {
             int(row): _likeness(targets, int(new), int(row), motion[row], looks, now)
             for row in old
-            if targets.ids[row]
+            if targets.ids[row] and not forbidden(zones, targets, int(new), int(row))
         }
         best = max(likeness, key=lambda row: (likeness[row], -row), default=-1)
         if best < 0 or likeness[best] < least:
@@ -81,15 +85,33 @@ def recall(
         if said:
             renamed.append(Renamed(said, name, 0, frame.index - 1))
         events.append(_event(targets, int(new), best, likeness[best], frame))
-        targets = targets.with_(
-            [new], ids=name, hits=targets.hits[best] + targets.hits[new], born=targets.born[best]
-        )
-        ours, theirs = int(targets.keys[new]), int(targets.keys[best])
-        keys[ours] = theirs
-        targets = targets.with_([new, best], keys=[theirs, ours])
-        targets = targets.with_([best], ids=0, compound=0, within=0, missed=np.inf)
+        keys[int(targets.keys[new])] = int(targets.keys[best])
+        targets = given(targets, int(new), best)
         region[best] = -1
     return Found(targets, region, keys, tuple(events), tuple(renamed))
+
+
+def given(targets: Targets, new: int, old: int) -> Targets:
+    """Return targets of which a new one has the identity of an old one, which is over."""
+    hits, born, ids = targets.hits[old] + targets.hits[new], targets.born[old], targets.ids[old]
+    targets = targets.with_([new], ids=ids, hits=hits, born=born, evidence=0.0)
+    targets = targets.with_([new, old], keys=targets.keys[[old, new]])
+    return targets.with_([old], ids=0, compound=0, within=0, missed=np.inf, behind=-1)
+
+
+def forbidden(zones: Zones, targets: Targets, new: int, old: int) -> bool:
+    """Return whether a rule between zones forbids that a new target is an old one."""
+    if not zones.rules:
+        return False
+    gap = np.array([[max(float(targets.born[new] - targets.seen[old]), 0.0)]])
+    return bool(
+        zones.verdicts(targets.boxes[[old]], targets.behind[[old]], came_in(targets, [new]), gap)[0, 0] < 0
+    )
+
+
+def came_in(targets: Targets, rows: Sequence[int]) -> Boxes:
+    """Return the boxes (K, 4) where young targets were seen first, of the size that they have now."""
+    return around(targets.lines.knots[rows, 0, 1:].astype(np.float32), targets.size[rows])
 
 
 def _young(targets: Targets, region: Index, time: float, size: tuple[int, int], confirm: float) -> Index:
@@ -98,7 +120,9 @@ def _young(targets: Targets, region: Index, time: float, size: tuple[int, int], 
     here = (region >= 0) & ~targets.temporary & (targets.compound == 0) & (targets.hidden == 0)
     edge = _EDGE * targets.size
     inside = ((first > edge) & (first < np.array([size[1], size[0]]) - edge)).all(axis=1)
-    return np.flatnonzero(here & inside & (age >= confirm - 1e-9) & (age <= _COMPARED) & _known(targets))
+    inside &= targets.entry < 0
+    compared = np.maximum(_COMPARED, targets.evidence)
+    return np.flatnonzero(here & inside & (age >= confirm - 1e-9) & (age <= compared) & _known(targets))
 
 
 def _missing(targets: Targets, region: Index, motion: Float, size: tuple[int, int]) -> Index:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from perdure.features.boxes import hull
 from perdure.features.masks import disjoint, holding, union
+from perdure.scene.zones import Zones
 from perdure.trackers.compound.gathering import HIDDEN, Held
 from perdure.trackers.compound.meetings import company
 from perdure.trackers.compound.targets import CENTRE, Targets, around, side_words
@@ -30,6 +31,7 @@ class Moment(NamedTuple):
     expected: Boxes  # (N, 4) where each should be
     silhouettes: bool  # whether regions have masks
     size: tuple[int, int]  # height, width of the picture
+    zones: Zones
 
 
 class Said(NamedTuple):
@@ -49,8 +51,8 @@ def say(targets: Targets, next_id: int, unsaid: Tracks, moment: Moment, confirm:
     spoken, rows = _rows(targets, group, moment, patience)
     late, unsaid = _late(targets, unsaid)
     things = named[~targets.temporary[named]]
-    begins = zip(targets.first[things].tolist(), targets.ids[things].tolist(), strict=True)
-    events = tuple(Event("entered", begin, begin, (one,)) for begin, one in begins)
+    begins = zip(*(column[things].tolist() for column in (targets.first, targets.ids, targets.entry)), strict=True)
+    events = tuple(Event("entered", begin, begin, (one,), moment.zones.name(at)) for begin, one, at in begins)
     mute = rows.ids == 0
     if mute.any():
         unsaid = Tracks.join([unsaid, rows.take(mute).replace(ids=targets.keys[spoken[mute]])])
@@ -82,7 +84,8 @@ def _named(
     """Give ids, in the order of the rows; return who has got one."""
     named = ((targets.ids == 0) & (moment.region >= 0)).nonzero()[0]
     if len(named):
-        lasted = moment.frame.time - targets.born[named] >= confirm - 1e-9
+        needed = np.maximum(targets.evidence[named], confirm)
+        lasted = moment.frame.time - targets.born[named] >= needed - 1e-9
         named = named[np.where(targets.temporary[named], group[named], lasted)]
         targets = targets.with_(named, ids=next_id + np.arange(len(named)))
     return targets, named
@@ -90,7 +93,7 @@ def _named(
 
 def _spoken(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: float) -> Index:
     """The rows of targets that are spoken of: all but temporary ones without a company, and those long unseen."""
-    lately = (moment.region >= 0) | (targets.missed <= patience + 1e-9)
+    lately = (moment.region >= 0) | (targets.missed <= patience + 1e-9) | (targets.behind >= 0)
     return (lately & (group | ~targets.temporary)).nonzero()[0]
 
 
@@ -102,7 +105,8 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
     shared = company(targets, moment.region)[rows] > 1
     boxes = moment.expected[rows]
     boxes[seen] = _seen_boxes(targets, rows[seen], region[seen], shared[seen], moment)
-    status = np.where(seen, targets.hidden[rows] > 0, int(Status.LOST))  # VISIBLE 0, PARTLY_OCCLUDED 1
+    away = np.where(targets.behind[rows] >= 0, int(Status.OCCLUDED), int(Status.LOST))
+    status = np.where(seen, targets.hidden[rows] > 0, away)  # VISIBLE 0, PARTLY_OCCLUDED 1
     sure = np.maximum(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0)
     sure[seen] = regions.scores[region[seen]]
     inferred = ~seen
@@ -196,14 +200,17 @@ def happenings(before: Targets, targets: Targets, moment: Moment) -> list[Event]
         why = f"the {side} does not match, the opposite side does"
         events.append(_event("partly_occluded", targets, row, float(targets.partly[row]), frame, why))
     for row in np.flatnonzero(unseen).tolist():
-        kind = "occluded" if shared[row] else "suspended"
+        zone = moment.zones.name(int(targets.behind[row]))
+        kind = "occluded" if shared[row] or zone else "suspended"
         why = "hidden by the others in its region" if shared[row] else "no region where it should be"
-        events.append(_event(kind, targets, row, float(targets.missed[row]), frame, why))
+        why = f"hidden behind {zone}" if zone else why
+        events.append(_event(kind, targets, row, float(targets.missed[row]), frame, why, zone))
     for row in np.flatnonzero(back).tolist():
+        zone = moment.zones.name(int(before.behind[row]))
         why = f"where its trajectory led, after {before.missed[row]:.1f} s"
-        events.append(Event("found_again", frame.index, frame.index, (int(targets.ids[row]),), why=why))
+        events.append(Event("found_again", frame.index, frame.index, (int(targets.ids[row]),), zone, why=why))
     return events
 
 
-def _event(kind: str, targets: Targets, row: int, lasted: float, frame: Frame, why: str) -> Event:
-    return Event(kind, frame.index, frame.index, (int(targets.ids[row]),), why=f"{why}, for {lasted:.1f} s")
+def _event(kind: str, targets: Targets, row: int, lasted: float, frame: Frame, why: str, zone: str = "") -> Event:
+    return Event(kind, frame.index, frame.index, (int(targets.ids[row]),), zone, why=f"{why}, for {lasted:.1f} s")

@@ -53,6 +53,9 @@ class Targets:
     looks: Float  # (N, *GRID, 4) mean colour and share seen of every cell of the box
     first: NDArray[np.int64]  # (N,) the frame in which it was first seen
     latest: NDArray[np.int64]  # (N,) the last frame in which it had a region
+    evidence: NDArray[np.float64]  # (N,) s for which it must be seen where it came in, before it is said
+    entry: NDArray[np.int64]  # (N,) the entry zone in which it came in; -1 for none
+    behind: NDArray[np.int64]  # (N,) the occluder behind which it is hidden; -1 for none
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -126,6 +129,9 @@ def newborn(frame: Frame, boxes: Boxes, scores: Float, classes: NDArray[np.str_]
         looks=np.zeros((count, *GRID, 4), np.float32),
         first=np.full(count, frame.index, np.int64),
         latest=np.full(count, frame.index, np.int64),
+        evidence=np.zeros(count),
+        entry=np.full(count, -1, np.int64),
+        behind=np.full(count, -1, np.int64),
     )
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.appearance import look, signature
 from perdure.params import parameter
+from perdure.scene.zones import Zones, counting, renumbered
 from perdure.trackers.compound.bodies import Bodies
 from perdure.trackers.compound.companies import Pair, accompany
 from perdure.trackers.compound.gathering import HIDDEN, Held, Sight, gather
@@ -23,6 +25,7 @@ from perdure.trackers.compound.recalling import Found, leaving, recall
 from perdure.trackers.compound.saying import Moment, happenings, say
 from perdure.trackers.compound.targets import Float, Targets, motions, newborn, predicted
 from perdure.trackers.compound.updating import learn, looked, unclaimed, update
+from perdure.trackers.compound.zoning import coming_in, hidden, place_of, placed, returned
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Tracks
 
 _UNNAMED = 0.2  # distance that a target without a name is put behind others
@@ -46,6 +49,7 @@ class CompoundState:
     next_id: int
     time: float  # s, of the last frame
     size: tuple[int, int]  # height, width of the picture
+    zones: Zones
 
 
 @dataclass(frozen=True)
@@ -118,13 +122,23 @@ class Compound:
             1,
             0.0,
             (scene.height, scene.width),
+            Zones.of(scene),
         )
 
     def step(self, state: CompoundState, frame: Frame, regions: Regions) -> tuple[CompoundState, Report]:
         """Predict, match, gather, form and resolve compounds, update, give birth, find again, say, retire."""
-        targets, time = state.targets, frame.time
+        after, report, numbers = counting(state.zones, regions, partial(self._step, state, frame))
+        if numbers is None:
+            return after, report
+        unsaid, early = (renumbered(rows, frame.index, numbers) for rows in (after.unsaid, after.early))
+        after = replace(after, unsaid=unsaid, early=early)
+        return after, replace(report, rows=renumbered(report.rows, frame.index, numbers))
+
+    def _step(self, state: CompoundState, frame: Frame, regions: Regions) -> tuple[CompoundState, Report]:
+        """Step on the regions that count."""
+        targets, time, zones = state.targets, frame.time, state.zones
         motion = motions(targets)
-        expected = predicted(targets, motion, time, self.patience)
+        expected = zones.held(predicted(targets, motion, time, self.patience), targets.behind)
         blobs = _are_silhouettes(regions)
         held = self._gathered(state, expected, frame, regions, blobs)
         meeting = form(targets, state.compounds, state.next_key, held, motion, frame, regions)
@@ -144,19 +158,23 @@ class Compound:
         )
         jitter = surprised(state.jitter, meeting.targets.surprise, targets.surprise)
         births = unclaimed(targets, meeting.region, held, regions, self.birth_score)
+        births = coming_in(zones, births, regions)
         if len(births):
-            scores, classes = regions.scores[births], regions.classes[births]
-            targets = targets.join(newborn(frame, regions.boxes[births], scores, classes, meeting.next_key))
+            boxes, scores, classes = regions.boxes[births], regions.scores[births], regions.classes[births]
+            new = newborn(frame, boxes, scores, classes, meeting.next_key)
+            targets = targets.join(placed(zones, new, boxes))
         region = np.concatenate([meeting.region, births])
         waited = 0.0 if regions.blind else time - state.time
         targets = _waited(targets, region, held, waited, frame.index)
+        targets = hidden(zones, targets, region, _expected(expected, targets))
         bodies = state.bodies
         if blobs:  # a detector's boxes hold whole bodies as they are
             bodies = learn(bodies, targets, region, time - state.time, state.size, _BODIES)
-        targets, found = self._recalled(targets, region, held, frame, regions, state.size)
-        region, unsaid = found.region, _rekeyed(state.unsaid, found.keys)
+        back = returned(zones, targets, region, frame, self.confirm, self.likeness)
+        targets, found = self._recalled(back.targets, back.region, held, frame, regions, state.size, zones)
+        region, unsaid = found.region, _rekeyed(_rekeyed(state.unsaid, back.keys), found.keys)
         company = accompany(state.pairs, targets, region, frame, regions.blind)
-        moment = Moment(frame, regions, region, held, _expected(expected, targets), blobs, state.size)
+        moment = Moment(frame, regions, region, held, _expected(expected, targets), blobs, state.size, zones)
         said = say(targets, state.next_id, unsaid, moment, self.confirm, self.patience)
         early, mended = state.early, Mended(said.targets, Tracks.empty(), (), ())
         if blobs:
@@ -164,30 +182,46 @@ class Compound:
             newly = np.flatnonzero((said.targets.ids >= state.next_id) & ~said.targets.temporary)
             mended = mend(early, said.targets, newly, bodies, state.size)
         told = happenings(state.targets, mended.targets, moment)
-        kept, gone = self._retired(mended.targets, region, frame, state.size, regions.blind)
+        kept, gone = self._retired(mended.targets, region, frame, state.size, regions.blind, zones)
         live = set(kept.compound.tolist())
         compounds = tuple(one for one in meeting.compounds if one.key in live)
         key = meeting.next_key + len(births)
         state = CompoundState(
-            kept, said.unsaid, early, compounds, company.pairs, bodies, jitter, key, said.next_id, time, state.size
+            kept,
+            said.unsaid,
+            early,
+            compounds,
+            company.pairs,
+            bodies,
+            jitter,
+            key,
+            said.next_id,
+            time,
+            state.size,
+            zones,
         )
         rows = Tracks.join([mended.rows, said.rows])
-        events = (*said.events, *mended.events, *company.events, *meeting.events, *found.events, *told, *gone)
-        return state, Report(rows, (*meeting.renamed, *found.renamed), mended.dropped, events)
+        again = (*back.events, *found.events)
+        events = (*said.events, *mended.events, *company.events, *meeting.events, *again, *told, *gone)
+        return state, Report(rows, (*meeting.renamed, *back.renamed, *found.renamed), mended.dropped, events)
 
     def finish(self, state: CompoundState) -> Report:
         """Return what is left to say: who had left when the film ended."""
         targets = state.targets
         unseen = (targets.ids > 0) & ~targets.temporary & ~targets.frozen & (targets.missed > 0)
-        out = np.flatnonzero(unseen & leaving(targets, motions(targets), state.size))
-        return Report(events=tuple(_gone(targets, out, int(targets.latest.max(initial=0)), state.size)))
+        out = leaving(targets, motions(targets), state.size) | (state.zones.left(targets.boxes) >= 0)
+        gone = np.flatnonzero(unseen & out)
+        return Report(
+            events=tuple(_gone(targets, gone, int(targets.latest.max(initial=0)), state.size, state.zones))
+        )
 
     def _gathered(
         self, state: CompoundState, expected: Boxes, frame: Frame, regions: Regions, blobs: bool
     ) -> Held:
         """Who is in which region; hidden members of compounds are looked for too, where they would have come out."""
         targets = state.targets
-        lately = np.where(targets.frozen, targets.missed > 0, targets.missed <= self.patience + 1e-9)
+        patience = self.patience * state.zones.stays(targets.boxes)
+        lately = np.where(targets.frozen, targets.missed > 0, targets.missed <= patience + 1e-9)
         active = lately.nonzero()[0]
         unseen = np.minimum(targets.missed / max(self.patience, 1e-6), 1.0)
         behind = _UNSEEN if blobs else _JITTER * state.jitter.spread
@@ -208,6 +242,7 @@ class Compound:
             targets.temporary[active],
             cost[active].astype(np.float32),
             limits,
+            place_of(state.zones, targets, active, expected, frame, regions),
         )
         fresh = (targets.ids == 0) & (frame.time - targets.born < self.confirm)
         near = self.apart if blobs else -1.0
@@ -222,6 +257,7 @@ class Compound:
         frame: Frame,
         regions: Regions,
         size: tuple[int, int],
+        zones: Zones,
     ) -> tuple[Targets, Found]:
         """Bring looks up to date and find lost targets again by them; nothing without a picture."""
         image = frame.image
@@ -233,25 +269,38 @@ class Compound:
             return signature(look(image, held.masks.get(row, Mask.empty()), (x1, y1, x2, y2)))
 
         targets = looked(targets, region, image, regions)
-        found = recall(targets, region, motions(targets), frame, size, self.confirm, self.likeness, now)
+        found = recall(targets, region, motions(targets), frame, size, self.confirm, self.likeness, now, zones)
         return found.targets, found
 
     def _retired(
-        self, targets: Targets, region: NDArray[np.intp], frame: Frame, size: tuple[int, int], blind: bool
+        self,
+        targets: Targets,
+        region: NDArray[np.intp],
+        frame: Frame,
+        size: tuple[int, int],
+        blind: bool,
+        zones: Zones,
     ) -> tuple[Targets, list[Event]]:
         """Let go of who was not seen for long (IV.D), and of unnamed ones at the first miss."""
-        doubtful = (targets.missed > min(self.patience, self.longest)) | (targets.ids == 0)
+        soonest = 0.0 if zones else min(self.patience, self.longest)
+        doubtful = (targets.missed > soonest) | (targets.ids == 0)
         events: list[Event] = []
-        if doubtful.any() and not (kept := self._kept(targets, region, frame, size, blind)).all():
+        if doubtful.any() and not (kept := self._kept(targets, region, frame, size, blind, zones)).all():
             gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
-            events, targets = _gone(targets, gone, frame.index, size), targets.take(kept)
+            events, targets = _gone(targets, gone, frame.index, size, zones), targets.take(kept)
         if not targets.compound.any():
             return targets, events
         orphans = targets.frozen & ~np.isin(targets.within, targets.keys[targets.temporary])
         return targets.with_(orphans, compound=0, within=0) if orphans.any() else targets, events
 
     def _kept(
-        self, targets: Targets, region: NDArray[np.intp], frame: Frame, size: tuple[int, int], blind: bool
+        self,
+        targets: Targets,
+        region: NDArray[np.intp],
+        frame: Frame,
+        size: tuple[int, int],
+        blind: bool,
+        zones: Zones,
     ) -> NDArray[np.bool_]:
         """Which targets (N,) are not let go of."""
         remembered = self.recall if frame.image is not None and self.colour else self.patience
@@ -261,7 +310,14 @@ class Compound:
                 ~targets.frozen & leaving(targets, motions(targets), size), self.patience + 1e-9, limit
             )
         unnamed = ~targets.temporary & (targets.ids == 0)
-        kept = np.where(unnamed, region >= 0, targets.missed <= limit)
+        seen = region >= 0
+        if zones:
+            away = np.flatnonzero((targets.missed > 0) & np.isfinite(targets.missed) & ~targets.frozen & ~unnamed)
+            boxes, out = targets.boxes[away], leaving(targets, motions(targets), size)[away]
+            limit[away] = zones.kept(boxes, targets.behind[away], limit[away], out) + 1e-9
+            lasted = frame.time - targets.born >= self.confirm  # would have a name, came it in elsewhere
+            seen |= lasted & (targets.evidence > self.confirm) & (targets.missed <= self.confirm + 1e-9)
+        kept = np.where(unnamed, seen, targets.missed <= limit)
         if blind:
             kept |= unnamed | targets.temporary
         return np.asarray(kept & np.isfinite(targets.missed))
@@ -283,20 +339,28 @@ def _are_silhouettes(regions: Regions) -> bool:
     return any(mask.bits.size for mask in regions.masks)
 
 
-def _gone(targets: Targets, rows: NDArray[np.intp], index: int, size: tuple[int, int]) -> list[Event]:
+def _gone(
+    targets: Targets, rows: NDArray[np.intp], index: int, size: tuple[int, int], zones: Zones
+) -> list[Event]:
     """What is told of targets that are let go: from the first frame without them, whether they left or were lost."""
     if not len(rows):
         return []
-    out = leaving(targets, motions(targets), size)
+    out = leaving(targets, motions(targets), size)[rows]
+    exits, behind = zones.left(targets.boxes[rows]), targets.behind[rows]
     return [
         Event(
-            "left" if out[row] else "lost",
+            "left" if over or by >= 0 else "lost",
             min(int(targets.latest[row]) + 1, index),
             index,
             (int(targets.ids[row]),),
-            why="over the border" if out[row] else "not seen again inside the picture",
+            zones.name(by) if over or by >= 0 else zones.name(back),
+            why="over the border"
+            if over
+            else "through an exit"
+            if by >= 0
+            else "not seen again inside the picture",
         )
-        for row in rows.tolist()
+        for row, over, by, back in zip(rows.tolist(), out.tolist(), exits.tolist(), behind.tolist(), strict=True)
     ]
 
 
