@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from perdure import params
 from perdure.errors import ParameterError
+from perdure.files.zones import read_zones
+from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Mask, Regions, Report, Scene, Tracks
 
@@ -38,6 +41,8 @@ class Online:
         Frames per second where `update` is given no timestamp.
     width, height : int
         The picture's size; masks and boxes are cut to it. 0: taken from the first frame, else unknown.
+    zones : str, Path, Zones or None
+        Zones of the place and rules between them, in pixels of the picture: a file of GeoJSON.
     parameters
         The tracker's parameters by name.
 
@@ -57,6 +62,7 @@ class Online:
         fps: float = 25.0,
         width: int = 0,
         height: int = 0,
+        zones: str | Path | Zones | None = None,
         **parameters: object,
     ) -> None:
         if not isinstance(tracker, str) or tracker not in TRACKERS:
@@ -64,6 +70,7 @@ class Online:
         camera = params.build(_Camera, {"fps": fps, "width": width, "height": height})
         self.tracker = params.build(TRACKERS[tracker], parameters)
         self._fps, self._size = camera.fps, (camera.width, camera.height)
+        self._zones = read_zones(zones, *self._size) if isinstance(zones, (str, Path)) else zones
         self.reset()
 
     def reset(self) -> None:
@@ -127,7 +134,8 @@ class Online:
         width, height = self._size
         if frame is not None and not (width and height):
             height, width = frame.shape[:2]
-        return Scene(width or _UNBOUNDED, height or _UNBOUNDED, self._fps)
+        scene = Scene(width or _UNBOUNDED, height or _UNBOUNDED, self._fps)
+        return scene if self._zones is None else replace(scene, zones=self._zones.zones, rules=self._zones.rules)
 
 
 def to_regions(detections: Any) -> Regions:

@@ -19,8 +19,10 @@ from perdure.errors import DamagedVideo, FormatError, ParameterError
 from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
-from perdure.files.shapes import is_file
+from perdure.files.shapes import filled, is_file
 from perdure.files.video import Source, open_source
+from perdure.files.zones import read_zones
+from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
 
@@ -127,6 +129,7 @@ def plan(
     end: str | float | None = None,
     stride: int = 1,
     roi: str | None = None,
+    zones: str | Path | Zones | None = None,
     classes: str | Collection[str] | None = (),
     parameters: Mapping[str, object] | None = None,
 ) -> Plan:
@@ -153,6 +156,8 @@ def plan(
         Take every n-th frame.
     roi : str or None
         Where things may be seen: an image, a polygon, a box or a file of polygons.
+    zones : str, Path, Zones or None
+        Entries, exits, occluders and other zones of the place, and rules between them: a file of GeoJSON.
     classes : str or collection of str
         Only regions of these classes.
     parameters : mapping
@@ -178,6 +183,8 @@ def plan(
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
+        if zones is not None:
+            scene = zoned(scene, zones)
         marks: tuple[Mark, ...] = ()
         if init is not None and words:
             _refuse_late_start(opened, start)
@@ -206,7 +213,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, classes; and parameters of the
+        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, zones, classes; and parameters of the
         detector and the tracker by name.
 
     Raises
@@ -242,6 +249,18 @@ def follow(source: AnySource, **options: Any) -> Iterator[fold.Step]:
         yield from made.prepared().steps()
     finally:
         made.source.close()
+
+
+def zoned(scene: Scene, zones: str | Path | Zones) -> Scene:
+    """Return the scene with zones, read from a file where one is named; what is to be ignored is cut out of its roi."""
+    if not isinstance(zones, Zones):
+        zones = read_zones(zones, scene.width, scene.height)
+    ignored = [list(map(list, rings)) for one in zones.zones if one.kind == "ignore" for rings in one.polygons]
+    roi = scene.roi
+    if ignored:
+        seen = ~filled(ignored, scene.width, scene.height)
+        roi = seen if roi is None else roi & seen
+    return dataclasses.replace(scene, zones=zones.zones, rules=zones.rules, roi=roi)
 
 
 def detector_name(detector: str | Path | None) -> str:
@@ -323,7 +342,7 @@ def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _OPTIONS = frozenset(
-    ("tracker", "detector", "init", "fps", "start", "end", "stride", "roi", "classes", "parameters")
+    ("tracker", "detector", "init", "fps", "start", "end", "stride", "roi", "zones", "classes", "parameters")
 )
 
 

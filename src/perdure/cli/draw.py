@@ -16,6 +16,8 @@ from perdure.errors import OutputError, VideoError
 from perdure.files.runs import RunFolder
 from perdure.files.video import open_source
 from perdure.files.whole import refuse_existing
+from perdure.files.zones import zones_of_json
+from perdure.pipeline import zoned
 
 
 def draw(
@@ -65,10 +67,13 @@ def draw(
         )
     if opened.rereadable and Path(source).exists() and output.exists() and output.samefile(source):
         raise OutputError(f"{output} is the source itself; name another file with -o")
+    scene = opened.scene(None)
+    if about.get("zones"):
+        scene = zoned(scene, zones_of_json(about["zones"]))
     marks = None if truth is None else marks_by_frame(run, truth, linger=round(opened.fps))
     with Ending() as ending:
         ending.at_once()
-        damage = draw_film(opened, opened.scene(None), folder, opened.count, output, marks)
+        damage = draw_film(opened, scene, folder, opened.count, output, marks)
     opened.close()
     if damage is not None and not output.exists():
         raise damage

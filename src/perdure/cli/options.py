@@ -52,6 +52,15 @@ RoiOption = Annotated[
         show_default=False,
     ),
 ]
+ZonesOption = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--zones",
+        metavar="FILE",
+        help="Entries, exits, occluders and other zones of the place, and rules between them: GeoJSON in pixels.",
+        show_default=False,
+    ),
+]
 ClassOption = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(

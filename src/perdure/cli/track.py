@@ -24,8 +24,10 @@ from perdure.errors import OutputError
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
 from perdure.files.shapes import is_file
+from perdure.files.zones import zones_to_json
 from perdure.fold import Step
 from perdure.pipeline import Plan, plan
+from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
 
 _FAMILIES = (("tracker", TRACKERS), ("detector", DETECTORS), ("", {"What counts": Reporting}))
@@ -52,6 +54,7 @@ def track(
     detector: options.DetectorOption = None,
     init: options.InitOption = None,
     roi: options.RoiOption = None,
+    zones: options.ZonesOption = None,
     class_: options.ClassOption = None,
     fps: options.FpsOption = None,
     start: options.StartOption = None,
@@ -77,13 +80,16 @@ def track(
         end=end,
         stride=stride,
         roi=roi,
+        zones=zones,
         classes=class_ or (),
         parameters=given,
     )
     place = output or Path("perdure-runs") / made.source.name
-    inputs = [Path(one) for one in (source, detector, roi, parameters) if one is not None and is_file(one)]
+    inputs = [Path(one) for one in (source, detector, roi, zones, parameters) if one is not None and is_file(one)]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
+    if zones is not None:
+        window["zones"] = str(zones)
     outcome = run(made, folder, reporting, window=window, film=not no_video)
     show(outcome, folder, as_json=json_)
     if outcome.code:
@@ -234,4 +240,5 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
         "reporting": params.values(reporting),
+        **({"zones": zones_to_json(Zones.of(made.scene))} if made.scene.zones else {}),
     }

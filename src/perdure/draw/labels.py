@@ -42,16 +42,24 @@ def lay_labels(picture: Image, clock: str, labels: Sequence[Label], size: int, *
         )
         if text and room:
             y = margin if top else picture.shape[0] - margin - chip.shape[0]
-            taken.append(_lay(picture, margin, y, chip, 0.75))
+            taken.append(lay_chip(picture, margin, y, chip, 0.75))
     for label in labels:
-        paper, letters = (label.colour, readable_on(label.colour)) if label.bold else (DARK, label.colour)
-        chip = _chip(label.text, paper, letters, size)
-        if chip.shape[0] <= picture.shape[0] // 2 and chip.shape[1] <= picture.shape[1]:
-            x, y = _free_place(label, chip, taken, picture)
-            taken.append(_lay(picture, x, y, chip, 0.92))
+        found = free_chip(label, taken, picture, size)
+        if found is not None:
+            taken.append(lay_chip(picture, *found, 0.92))
 
 
-def _lay(picture: Image, x: int, y: int, chip: Image, share: float) -> Place:
+def free_chip(label: Label, taken: Sequence[Place], picture: Image, size: int) -> tuple[int, int, Image] | None:
+    """Return the corner x, y at which a label covers no other, and its chip; None where the picture is too small."""
+    paper, letters = (label.colour, readable_on(label.colour)) if label.bold else (DARK, label.colour)
+    chip = _chip(label.text, paper, letters, size)
+    if chip.shape[0] > picture.shape[0] // 2 or chip.shape[1] > picture.shape[1]:
+        return None
+    return (*_free_place(label, chip, taken, picture), chip)
+
+
+def lay_chip(picture: Image, x: int, y: int, chip: Image, share: float) -> Place:
+    """Blend a chip into the picture at a corner; return the place it takes."""
     height, width = chip.shape[:2]
     under = picture[y : y + height, x : x + width]
     under[:] = cv2.addWeighted(under, 1.0 - share, chip, share, 0.0)

@@ -31,6 +31,7 @@ from perdure.draw.labels import Label, lay_labels
 from perdure.draw.marks import LEGEND, Mark, mark_labels, mark_strokes
 from perdure.draw.strokes import SHIFT, Lines, Stroke, Style, between_pixels, brackets, broken, whole
 from perdure.draw.trails import Trails, draw_trails
+from perdure.draw.zones import draw_zones
 from perdure.features.outlines import seen_and_hidden
 from perdure.types import Frame, Image, Mask, Scene, Status, Tracks
 
@@ -58,7 +59,7 @@ def paint(
     trails : Trails
         Where the ids have been; `Trails.empty()` for none.
     scene : Scene
-        Gives the size where the frame has no image.
+        Gives the size where the frame has no image, and the zones, whose outlines are drawn beneath.
     masks : bool
         Whether silhouettes are drawn too.
     marks : sequence of Mark, or None
@@ -75,6 +76,8 @@ def paint(
     looks = _looks(seen, style)
     silhouettes = _silhouettes(seen, looks, style, height, width) if masks else []
     dashed = _believed_contours(seen, looks, style, height, width) if masks else []
+    if scene.zones:
+        draw_zones(picture, scene, style)
     if masks:
         _fill_masks(picture, seen)
     if frame.image is None:
