@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import ParameterError
+from perdure.features.boxes import areas
 from perdure.params import unknown_name
 from perdure.types import Boxes, Regions, Report, Scene, Tracks
 
@@ -46,6 +47,10 @@ ANYWHERE = "*"  # in a rule: any zone, or none
 FORBIDDEN, OPEN, EXPECTED = -1, 0, 1  # verdicts on a lost target and a newcomer
 HALF = 0.5  # share of a box, from which it is in a zone
 _HIDING = 0.2  # share of a box in an occluder, from which a lost target may be behind it
+_RATIO = (
+    3.0  # of areas of a lost target and a newcomer: who comes out from behind something is seen in part at first
+)
+_FIRST = 0.01  # of a logarithm of areas: of two, who was lost first is found first
 _EDGE = 0.25  # widths of a newcomer round an occluder, within which she may have come out from behind it
 
 
@@ -314,6 +319,21 @@ class Zones:
             timely = (gaps >= rule.after - 1e-9) & (gaps <= rule.within + 1e-9) & (not rule.never)
             verdict[both] = np.where(timely, EXPECTED, FORBIDDEN)[both]
         return verdict
+
+    def returning(self, lost: Boxes, behind: Index, found: Boxes, gaps: Float) -> Float:
+        """Return how unlike (L, F) lost targets and newcomers are whom an occluder or a rule lets expect; inf: not one.
+
+        Arguments are those of `verdicts`. Told apart are they by their areas, which differ by the factor 3 at most, and
+        by who was lost first.
+        """
+        cost = np.full(gaps.shape, np.inf)
+        if not cost.size or not (self.has("occlusion") or self.rules):
+            return cost
+        one, other = (np.log(np.maximum(areas(boxes).astype(np.float64), 1.0)) for boxes in (lost, found))
+        unlike = np.abs(one[:, None] - other[None])  # (L, F)
+        expected = (self.verdicts(lost, behind, found, gaps) == EXPECTED) & (unlike <= np.log(_RATIO)) & (gaps > 0)
+        first = np.argsort(np.argsort(-gaps, axis=0, kind="stable"), axis=0, kind="stable")
+        return np.where(expected, unlike + _FIRST * first, cost)
 
     def rule(self, lost: Boxes, found: Boxes) -> Rule | None:
         """Return the rule that decides on one lost box (4,) and one found (4,), if any."""

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.appearance import alike, signature
-from perdure.features.boxes import areas
 from perdure.maths.assign import assign
-from perdure.scene.zones import ANYWHERE, EXPECTED, FORBIDDEN, Zones
+from perdure.scene.zones import ANYWHERE, FORBIDDEN, Zones
 from perdure.trackers.compound.matrix import Place
 from perdure.trackers.compound.recalling import Found, came_in, given
 from perdure.trackers.compound.targets import Targets
@@ -16,9 +15,7 @@ from perdure.types import Boxes, Event, Frame, Regions, Renamed
 
 Index = NDArray[np.intp]
 _COMPARED = 1.0  # s of age, up to which a new target is compared
-_RATIO = 3.0  # of areas, at most: who comes out from behind something is not seen whole at first
 _LESS = 0.8  # of the likeness that is asked for elsewhere
-_SOONER = 0.01  # of a cost: of two, who was lost first is found first
 
 
 def place_of(
@@ -93,11 +90,10 @@ def returned(zones: Zones, targets: Targets, region: Index, frame: Frame, confir
     )
     if not len(new) or not len(old):
         return nothing
-    gaps = np.asarray(targets.born[new][None] - targets.seen[old][:, None])  # (O, N)
+    gaps = targets.born[new][None] - targets.seen[old][:, None]  # (O, N)
     first = came_in(targets, new.tolist())
-    verdicts = zones.verdicts(targets.boxes[old], targets.behind[old], first, np.maximum(gaps, 0.0))
-    allowed = np.asarray(verdicts == EXPECTED) & (gaps >= -1e-9)
-    cost = np.asarray(np.where(allowed, _costs(targets, old, new, _LESS * least), np.inf))
+    cost = zones.returning(targets.boxes[old], targets.behind[old], first, gaps)
+    cost = _looked_at(cost, targets, old, new, _LESS * least)
     found, _, _ = assign(cost)
     region, keys, events, renamed = region.copy(), {}, [], []
     for one, other in found.tolist():
@@ -111,18 +107,16 @@ def returned(zones: Zones, targets: Targets, region: Index, frame: Frame, confir
     return Found(targets, region, keys, tuple(events), tuple(renamed))
 
 
-def _costs(targets: Targets, old: Index, new: Index, least: float) -> NDArray[np.float64]:
-    """How unlike (O, N) lost and new targets are; inf where they are not one."""
-    sizes = [np.log(np.maximum(areas(targets.boxes[rows]).astype(np.float64), 1.0)) for rows in (old, new)]
-    unlike = np.abs(sizes[0][:, None] - sizes[1][None])  # (O, N)
-    cost = np.asarray(np.where(unlike <= np.log(_RATIO), unlike, np.inf), np.float64)
+def _looked_at(
+    cost: NDArray[np.float64], targets: Targets, old: Index, new: Index, least: float
+) -> NDArray[np.float64]:
+    """How unlike (O, N) lost and new targets are, by their looks where those are known; inf where they are not one."""
     known = np.asarray(targets.looks[..., 3].any(axis=(1, 2)))  # (N,)
-    for one, lost in enumerate(old.tolist()):
-        for other, row in enumerate(new.tolist()):
-            if known[lost] and known[row] and np.isfinite(cost[one, other]):
-                like = alike(signature(targets.looks[lost]), signature(targets.looks[row]))
-                cost[one, other] = 1.0 - like if like >= least else np.inf
-    return np.asarray(cost + _SOONER * np.argsort(np.argsort(targets.seen[old], kind="stable"))[:, None])
+    cost = cost.copy()
+    for one, other in np.argwhere(np.isfinite(cost) & known[old][:, None] & known[new][None]).tolist():
+        like = alike(signature(targets.looks[old[one]]), signature(targets.looks[new[other]]))
+        cost[one, other] = 1.0 - like if like >= least else np.inf
+    return cost
 
 
 def _event(
