@@ -9,6 +9,8 @@ import pytest
 from films import HEIGHT, WIDTH, Thing, film, followed, overlap, seen, texture, walker
 
 from perdure.scene.backdrop import Backdrop
+from perdure.scene.whereabouts import Waiting
+from perdure.scene.zones import Zones
 from perdure.trackers.trackcut.births import Nursery, births
 from perdure.trackers.trackcut.competing import apart, claims, divided
 from perdure.trackers.trackcut.learning import LONG, pieces
@@ -197,7 +199,8 @@ def test_a_lost_one_is_found_again_near_and_not_at_the_other_side():
         sight = look_at(picture)
         mask = block(x, 40, 20, 40)
         regions = Regions.of([mask.box], masks=[mask])
-        born = births(nursery, [gone], (mask,), (2, 2), Frame(5, 0.5, picture), sight, regions, [mask])
+        waiting = Waiting.first(Zones(), mask, 0.4)
+        born = births(nursery, [gone], (waiting,), (2, 2), Frame(5, 0.5, picture), sight, regions, [mask])
         assert born.new == (0 if again else 1)
         assert (born.targets[0].missed == 0) is again
 

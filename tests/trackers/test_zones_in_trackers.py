@@ -60,10 +60,10 @@ def still(x: int, y: int, begin: int, end: int = 10**6) -> Path:
     return walk((x, y), (0, 0), begin, end)
 
 
-ZONED = ("compound", "overlap")
-every = pytest.mark.parametrize("tracker", ZONED)
-boxes_alone = pytest.mark.parametrize("tracker", [name for name in ZONED if not TRACKERS[name].needs_pixels])
-from_pixels = pytest.mark.parametrize("tracker", [name for name in ZONED if TRACKERS[name].needs_pixels])
+every = pytest.mark.parametrize("tracker", TRACKERS)
+PLAIN = [name for name, kind in TRACKERS.items() if not kind.needs_pixels]
+boxes_alone = pytest.mark.parametrize("tracker", PLAIN)
+from_pixels = pytest.mark.parametrize("tracker", [name for name in TRACKERS if name not in PLAIN])
 
 
 # Entries ----------------------------------------------------------------------------------------------------
@@ -89,11 +89,11 @@ def test_who_appears_outside_all_entries_must_be_seen_for_a_second_and_then_all_
 
 @from_pixels
 def test_from_pixels_who_appears_outside_all_entries_is_born_after_a_second(tracker: str):
-    shortly, long = World((Block(still(60, 30, 3, 11)),)), World((Block(still(60, 30, 3)),))
+    shortly, long = World((Block(still(60, 30, 3, 11)),), 14), World((Block(still(60, 30, 3)),), 15)
     assert told(tracker, shortly, (DOOR,)).ids == []
     assert told(tracker, long).of("entered") == [("entered", 4, (1,), "")]
     assert told(tracker, long, (DOOR,)).of("entered") == [("entered", 13, (1,), "")]
-    by_door = World((Block(still(5, 30, 3)),))
+    by_door = World((Block(still(5, 30, 3)),), 7)
     assert told(tracker, by_door, (DOOR,)).of("entered") == [("entered", 4, (1,), "door")]
 
 
@@ -102,15 +102,15 @@ def test_from_pixels_who_appears_outside_all_entries_is_born_after_a_second(trac
 
 @every
 def test_who_is_lost_in_an_exit_has_left_by_it_soon(tracker: str):
-    world = World((Block(walk((60, 30), (2, 0), 3, 25)),), count=80)
-    (event,) = [one for one in told(tracker, world, (OUT,)).events if one.kind in ("left", "lost")]
+    world, door = World((Block(still(50, 30, 3, 25)),), count=40), Zone("exit", "out", rectangle(40, 0, 80, 80))
+    (event,) = [one for one in told(tracker, world, (door,)).events if one.kind in ("left", "lost")]
     assert (event.kind, event.zone, event.ids) == ("left", "out", (1,))
     assert event.end == 24 + 11, "1.0 s after he was seen last, and not later than that"
 
 
 @every
 def test_who_is_lost_elsewhere_is_kept_for_twice_as_long_where_exits_are_drawn(tracker: str):
-    world = World((Block(still(50, 30, 3, 25)),), count=200)
+    world = World((Block(still(50, 30, 3, 25)),), count=150)
     ends = {}
     for zones in ((), (OUT,)):
         (event,) = [one for one in told(tracker, world, zones).events if one.kind in ("left", "lost")]
@@ -157,6 +157,15 @@ def test_who_is_behind_an_occluder_for_long_keeps_the_id_and_is_said_to_be_there
 def test_behind_an_occluder_one_is_kept_for_as_long_as_it_says(tracker: str):
     assert told(tracker, behind_a_wall(45), (replace(WALL, patience=3.0),)).ids == [1, 2]
     assert told(tracker, behind_a_wall(140), (replace(WALL, patience=20.0),)).ids == [1]
+
+
+@every
+def test_who_is_lost_at_an_occluder_is_kept_for_longer_and_the_event_names_it(tracker: str):
+    world, hedge = World((Block(still(50, 30, 3, 15)),), count=64), replace(WALL, name="hedge", patience=4.0)
+    said = told(tracker, world, (hedge,))
+    assert [one[2:] for one in said.of("occluded")] == [((1,), "hedge")]
+    (end,) = [one for one in said.events if one.kind in ("left", "lost")]
+    assert end.end == 14 + 41
 
 
 @boxes_alone
@@ -257,6 +266,15 @@ def test_who_is_lost_in_a_is_never_found_in_c_even_where_he_should_be(tracker: s
     assert told(tracker, away(4, 8), TUNNEL, rules).ids == [1, 2]
 
 
+@from_pixels
+def test_from_pixels_too_who_is_lost_in_a_is_never_found_in_a(tracker: str):
+    rules = (Rule("A", "A", never=True),)
+    assert told(tracker, away(4, 8), TUNNEL).ids == [1]
+    said = told(tracker, away(4, 8), TUNNEL, rules)
+    assert said.ids == [1, 2]
+    assert said.of("found_again") == []
+
+
 @boxes_alone
 def test_of_two_who_are_lost_who_went_first_comes_first(tracker: str):
     first, second = still(8, 10, 3, 20), still(8, 50, 3, 26)
@@ -275,7 +293,7 @@ def test_zones_that_nobody_is_in_change_nothing(tracker: str):
     """An ignored corner, an occluder and noise far away: the same rows and events."""
     corner = rectangle(100, 70, 120, 80)
     idle = tuple(Zone(kind, kind, corner) for kind in ("occlusion", "noise", "ignore", "low-contrast"))
-    world = World((Block(walk((5, 30), (2, 0), begin=3)), Block(walk((90, 10), (-2, 0), begin=2))), count=40)
+    world = World((Block(walk((5, 30), (2, 0), begin=3)), Block(walk((90, 10), (-2, 0), begin=2))), count=16)
     plain, zoned = told(tracker, world), told(tracker, world, idle)
     assert plain.tracks.equals(zoned.tracks)
     assert plain.events == zoned.events

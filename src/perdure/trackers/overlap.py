@@ -21,7 +21,6 @@ from perdure.scene.zones import FORBIDDEN, Zones, counting, renumbered
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
 
 Index = NDArray[np.intp]
-_UNSEEN = 0.45  # confidence, at most, of a target that is hidden
 _COLUMNS = ("ids", "boxes", "speed", "born", "seen", "missed", "evidence", "entry", "behind")
 
 
@@ -156,14 +155,14 @@ class Overlap:
 
     def _rows(self, state: OverlapState, frame: Frame, regions: Regions, link: Index) -> Tracks:
         """Return a row for every target; an unseen one is LOST, where it is expected, less and less surely."""
-        hope = np.where(state.behind >= 0, _UNSEEN, 1.0) - state.missed / max(self.patience, 1e-6)
+        hope = 1.0 - state.missed / max(self.patience, 1e-6)
         seen, away = link >= 0, np.where(state.behind >= 0, Status.OCCLUDED, Status.LOST)
         masks = disjoint([(*regions.masks, Mask.empty())[j] for j in link], *state.scene_size)
         return Tracks.of(
             frames=frame.index,
             times=frame.time,
             ids=state.ids,
-            boxes=holding(_expected(state, frame.time), masks),
+            boxes=holding(state.zones.held(_expected(state, frame.time), state.behind), masks),
             status=np.where(seen, Status.VISIBLE, away),
             confidence=np.where(seen, np.append(regions.scores, 0)[link], np.clip(hope, 0.0, 1.0)),
             classes=np.append(regions.classes, "")[link],
@@ -194,7 +193,7 @@ class Overlap:
 def _expected(state: OverlapState, time: float) -> Boxes:
     """Where the last speed brings each target (N, 4)."""
     shift = state.speed * (time - state.seen)[:, None]  # (N, 2)
-    return state.zones.held(np.asarray(state.boxes + np.tile(shift, 2), np.float32), state.behind)
+    return np.asarray(state.boxes + np.tile(shift, 2), np.float32)
 
 
 def _hidden(state: OverlapState, frame: Frame) -> tuple[OverlapState, list[Event]]:

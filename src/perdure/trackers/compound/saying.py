@@ -108,7 +108,6 @@ def _rows(targets: Targets, group: NDArray[np.bool_], moment: Moment, patience: 
     away = np.where(targets.behind[rows] >= 0, int(Status.OCCLUDED), int(Status.LOST))
     status = np.where(seen, targets.hidden[rows] > 0, away)  # VISIBLE 0, PARTLY_OCCLUDED 1
     sure = np.maximum(1.0 - targets.missed[rows] / max(patience, 1e-6), 0.0)
-    sure = np.where(targets.behind[rows] >= 0, np.minimum(sure, _UNSEEN), sure)
     sure[seen] = regions.scores[region[seen]]
     inferred = ~seen
     if shared.any():

@@ -138,7 +138,7 @@ class Compound:
         """Step on the regions that count."""
         targets, time, zones = state.targets, frame.time, state.zones
         motion = motions(targets)
-        expected = zones.held(predicted(targets, motion, time, self.patience), targets.behind)
+        expected = predicted(targets, motion, time, self.patience)
         blobs = _are_silhouettes(regions)
         held = self._gathered(state, expected, frame, regions, blobs)
         meeting = form(targets, state.compounds, state.next_key, held, motion, frame, regions)
@@ -174,7 +174,8 @@ class Compound:
         targets, found = self._recalled(back.targets, back.region, held, frame, regions, state.size, zones)
         region, unsaid = found.region, _rekeyed(_rekeyed(state.unsaid, back.keys), found.keys)
         company = accompany(state.pairs, targets, region, frame, regions.blind)
-        moment = Moment(frame, regions, region, held, _expected(expected, targets), blobs, state.size, zones)
+        where = zones.held(_expected(expected, targets), targets.behind)
+        moment = Moment(frame, regions, region, held, where, blobs, state.size, zones)
         said = say(targets, state.next_id, unsaid, moment, self.confirm, self.patience)
         early, mended = state.early, Mended(said.targets, Tracks.empty(), (), ())
         if blobs:

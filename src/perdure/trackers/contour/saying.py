@@ -9,6 +9,7 @@ import numpy as np
 from perdure.features.masks import disjoint, holding
 from perdure.features.outlines import thinned
 from perdure.maths import levelset, lie
+from perdure.scene.zones import Zones
 from perdure.trackers.contour import observer
 from perdure.trackers.contour.targets import Target
 from perdure.types import Event, Frame, Mask, Outline, Status, Tracks
@@ -77,13 +78,16 @@ def has_left(box: tuple[int, int, int, int], size: tuple[int, int]) -> bool:
     return not (0 <= x < size[1] and 0 <= y < size[0])
 
 
-def gone(target: Target, frame: Frame, left: bool) -> Event:
+def gone(target: Target, frame: Frame, left: bool, zones: Zones) -> Event:
     """Return what is told of an object that is let go."""
-    why = "over the border" if left else "not seen again inside the picture"
-    return Event("left" if left else "lost", frame.index, frame.index, (target.id,), why=why)
+    by = target.last_seen.exit(zones)
+    kind = "left" if left or by >= 0 else "lost"
+    why = "over the border" if left else "through an exit" if by >= 0 else "not seen again inside the picture"
+    zone = zones.name(by if kind == "left" else target.last_seen.behind)
+    return Event(kind, frame.index, frame.index, (target.id,), zone, why=why)
 
 
-def happenings(before: Sequence[Target], now: Sequence[Target], frame: Frame) -> list[Event]:
+def happenings(before: Sequence[Target], now: Sequence[Target], frame: Frame, zones: Zones) -> list[Event]:
     """Return who has become hidden, and who is seen again."""
     old = {one.key: one for one in before}
     events = []
@@ -93,9 +97,11 @@ def happenings(before: Sequence[Target], now: Sequence[Target], frame: Frame) ->
             continue
         share = f"{one.visible:.0%} of the silhouette is seen"
         if was.missed == 0 < one.missed:
-            events.append(Event("occluded", frame.index, frame.index, (one.id,), why=share))
+            zone = zones.name(one.last_seen.behind)
+            events.append(Event("occluded", frame.index, frame.index, (one.id,), zone, why=share))
         elif was.missed > 0 == one.missed:
-            events.append(Event("found_again", frame.index, frame.index, (one.id,), why=share))
+            zone = zones.name(was.last_seen.behind)
+            events.append(Event("found_again", frame.index, frame.index, (one.id,), zone, why=share))
         elif one.visible < PARTLY <= was.visible and not one.missed:
             events.append(Event("partly_occluded", frame.index, frame.index, (one.id,), why=share))
     return events

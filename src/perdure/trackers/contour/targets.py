@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths.mixture import Mixture
+from perdure.scene.whereabouts import NOWHERE, Whereabouts
 from perdure.trackers.contour.observer import State
 from perdure.trackers.contour.recalling import Shape
 from perdure.types import Mask
@@ -60,6 +61,7 @@ class Target:
     class_: str
     links: tuple[int, ...]
     marked: bool
+    last_seen: Whereabouts = NOWHERE
 
 
 @dataclass(frozen=True, eq=False)

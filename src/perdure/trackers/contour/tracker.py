@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import cv2
@@ -14,6 +15,8 @@ from perdure.features.masks import mask_overlaps, mask_shares, silhouettes
 from perdure.maths import levelset, lie
 from perdure.maths.mixture import log_density
 from perdure.params import Schedule, parameter
+from perdure.scene.whereabouts import Waiting, awaited
+from perdure.scene.zones import Zones, counting, renumbered
 from perdure.trackers.contour import observer, recalling
 from perdure.trackers.contour.measuring import Measured, measured, of_evidence
 from perdure.trackers.contour.observer import Gains, State
@@ -32,7 +35,7 @@ from perdure.trackers.contour.seeing import (
     window_round,
 )
 from perdure.trackers.contour.targets import Looks, Place, Target
-from perdure.types import Bits, Event, Frame, Mask, Regions, Report, Scene
+from perdure.types import Bits, Event, Frame, Image, Mask, Regions, Report, Scene
 
 Float = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -65,13 +68,14 @@ class ContourState:
     """All objects, and the place."""
 
     targets: tuple[Target, ...]
-    waiting: tuple[Mask, ...]
+    waiting: tuple[Waiting, ...]
     place: Place
     light: NDArray[np.uint8]  # (H, W) grey of the frame before; (0, 0) before the first
     next_key: int
     next_id: int
     time: float
     size: tuple[int, int]  # height, width
+    zones: Zones
 
 
 class _Seen(NamedTuple):
@@ -159,39 +163,51 @@ class Contour:
             np.zeros((0, 0), np.uint8),
             1,
         )
-        return ContourState((), (), none, none.grey, 1, self.reserved + 1, 0.0, (scene.height, scene.width))
+        size = (scene.height, scene.width)
+        return ContourState((), (), none, none.grey, 1, self.reserved + 1, 0.0, size, Zones.of(scene))
 
     def step(self, state: ContourState, frame: Frame, regions: Regions) -> tuple[ContourState, Report]:
         """Predict, measure and update every object, learn, find new ones, say."""
         if frame.image is None:
             return replace(state, time=frame.time), Report()
-        lab = lab_of(frame.image)
-        grey, step = small_grey(frame.image)
+        after, report, numbers = counting(state.zones, regions, partial(self._step, state, frame, frame.image))
+        return after, replace(report, rows=renumbered(report.rows, frame.index, numbers))
+
+    def _step(
+        self, state: ContourState, frame: Frame, image: Image, regions: Regions
+    ) -> tuple[ContourState, Report]:
+        """Step on the regions that count."""
+        zones = state.zones
+        lab = lab_of(image)
+        grey, step = small_grey(image)
         nothing = np.zeros(lab.shape[:2], np.bool_)
         place = Place(lab, nothing, nothing, grey, step)
         if state.place.grey.shape == grey.shape:
             place, _ = moved_on(state.place, grey, step, self._things(state.targets, state.size))
-        light = np.asarray(cv2.cvtColor(np.ascontiguousarray(frame.image), cv2.COLOR_RGB2GRAY), np.uint8)
+        light = np.asarray(cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY), np.uint8)
         sights = [self._look(*self._moved(one, state.light, light), lab, place) for one in state.targets]
         waited = frame.time - state.time
         targets = self._updated(state.targets, sights, self._gains_of(frame.index), waited)
+        targets = [_allowed(zones, was, one, waited) for was, one in zip(state.targets, targets, strict=True)]
         targets, born, waiting, events = self._born(state, targets, frame, lab, place, regions)
         covered = np.any([nothing, *(one.seen.to_image(*state.size) for one in targets)], axis=0)
         place = learnt_place(place, lab, self._things(targets, state.size), covered, _PLACE_RATE)
         kept, believed = [], []
         for one in targets:
             whole = self._silhouette(one)
-            left = has_left(whole.box, state.size) and one.missed > 0
-            if one.missed > self.patience + 1e-9 or left or not whole.area:
-                events.append(gone(one, frame, left))
+            seen = one.seen.box if one.missed == 0 and one.seen.area else None
+            one = replace(one, last_seen=one.last_seen.after(zones, seen, whole.box))
+            left = has_left(whole.box, state.size) and one.missed > 0 and one.last_seen.behind < 0
+            if one.missed > one.last_seen.kept(zones, self.patience, left) + 1e-9 or left or not whole.area:
+                events.append(gone(one, frame, left, zones))
             else:
                 kept.append(one)
                 believed.append(whole)
         rows = rows_of(kept, believed, frame, state.size, self.patience, self._group)
-        events += happenings(state.targets, kept, frame)
+        events += happenings(state.targets, kept, frame, zones)
         next_id = max([state.next_id, *(one.id + 1 for one in born)])
         after = ContourState(
-            tuple(kept), waiting, place, light, state.next_key + len(born), next_id, frame.time, state.size
+            tuple(kept), waiting, place, light, state.next_key + len(born), next_id, frame.time, state.size, zones
         )
         return after, Report(rows, events=tuple(events))
 
@@ -592,7 +608,7 @@ class Contour:
         lab: NDArray[np.uint8],
         place: Place,
         regions: Regions,
-    ) -> tuple[list[Target], list[Target], tuple[Mask, ...], list[Event]]:
+    ) -> tuple[list[Target], list[Target], tuple[Waiting, ...], list[Event]]:
         """Found objects on regions that are nobody's, and on marks."""
         marks = regions.data.get("mark")
         if marks is None and regions.blind:
@@ -601,18 +617,23 @@ class Contour:
         masks = silhouettes(regions, *state.size)
         least = max(self.smallest * state.size[0] * state.size[1], 1)
         born: list[Target] = []
-        waiting: list[Mask] = []
+        waiting: list[Waiting] = []
         events: list[Event] = []
         next_id = max([state.next_id, *(one.id + 1 for one in targets)])
         held = [self._silhouette(one) for one in targets]
         for number, mask in enumerate(masks):
-            identity = int(marks[number]) if marks is not None else 0
+            identity, entry = int(marks[number]) if marks is not None else 0, -1
             if not identity:
                 if mask_shares([mask], held).sum() >= _COVERED or mask.area < least:
                     continue
-                if len(state.place.grey) and not (mask_shares([mask], state.waiting) > _SAME).any():
-                    waiting.append(mask)
+                known = awaited(mask, state.waiting, _SAME)
+                new = known or Waiting.first(state.zones, mask, frame.time)
+                if not np.isfinite(new.evidence):
                     continue
+                if len(state.place.grey) and not (known and new.is_due(frame.time)):
+                    waiting.append(new)
+                    continue
+                entry = new.entry
             elif mask.area < 1:
                 continue
             lost = _marked_before(targets, held, mask, identity) if identity else None
@@ -627,7 +648,7 @@ class Contour:
             one = self._newborn(mask, lab, place, regions, number, frame, state.next_key + len(born), identity)
             born.append(one)
             held.append(mask)
-            events.append(Event("entered", frame.index, frame.index, (identity,)))
+            events.append(Event("entered", frame.index, frame.index, (identity,), state.zones.name(entry)))
         if not masks:
             waiting = list(state.waiting)
         return [*targets, *born], born, tuple(waiting), events
@@ -667,6 +688,14 @@ class Contour:
             float(regions.scores[row]), str(regions.classes[row]), (row,),
             bool(regions.data["mark"][row]) if "mark" in regions.data else False,
         )  # fmt: skip
+
+
+def _allowed(zones: Zones, was: Target, now: Target, waited: float) -> Target:
+    """Return an object as it is now, or as one that is still not seen where a rule forbids that it is found there."""
+    found = was.missed > 0 == now.missed and now.seen.area
+    if not found or not was.last_seen.is_forbidden(zones, now.seen.box, was.missed + waited):
+        return now
+    return replace(was, missed=was.missed + waited, seen=Mask.empty(), links=())
 
 
 def covering(depth: Float, pull: Single, most: int, reach: int) -> tuple[int, int]:

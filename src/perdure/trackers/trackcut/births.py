@@ -9,6 +9,8 @@ import numpy as np
 
 from perdure.features.masks import mask_overlaps, mask_shares
 from perdure.scene.backdrop import Backdrop
+from perdure.scene.whereabouts import Waiting, awaited
+from perdure.scene.zones import EXPECTED, FORBIDDEN, Zones
 from perdure.trackers.trackcut.likelihoods import learn_colours, of_backdrop, of_colours, unlike
 from perdure.trackers.trackcut.seeing import Sight, colours_of
 from perdure.trackers.trackcut.shapes import over, recent_motion, to_shape
@@ -36,6 +38,7 @@ class Nursery(NamedTuple):
     trust: float  # in first looks
     bound: float  # nats
     backdrop: Backdrop
+    zones: Zones = Zones()
 
 
 class Born(NamedTuple):
@@ -43,14 +46,14 @@ class Born(NamedTuple):
 
     targets: list[Target]  # all: those of before, then the new ones
     new: int  # how many are
-    waiting: tuple[Mask, ...]
+    waiting: tuple[Waiting, ...]
     events: list[Event]
 
 
 def births(
     nursery: Nursery,
     targets: list[Target],
-    waiting: tuple[Mask, ...] | None,
+    waiting: tuple[Waiting, ...] | None,
     keys: tuple[int, int],
     frame: Frame,
     sight: Sight,
@@ -65,7 +68,7 @@ def births(
         What births go by.
     targets : list of Target
         As they are in this frame.
-    waiting : masks, or None
+    waiting : Waiting, or None
         Observations that were nobody's in the frame before; None in the first frame, when nobody waits.
     keys : (int, int)
         The next key, and the next id.
@@ -73,13 +76,13 @@ def births(
         The frame, and what a detector saw in it.
     """
     marks = regions.data.get("mark")
-    before = waiting or ()
+    before, zones = waiting or (), nursery.zones
     if marks is None and regions.blind:
         return Born(targets, 0, before, [])
     targets, next_key, next_id = list(targets), keys[0], max([keys[1], *(one.id + 1 for one in targets)])
     taken = {number for one in targets for number in one.links}
     born: list[Target] = []
-    wait: list[Mask] = []
+    wait: list[Waiting] = []
     events: list[Event] = []
     for number, mask in enumerate(observations):
         identity = int(marks[number]) if marks is not None else 0
@@ -88,7 +91,7 @@ def births(
             covered = mask_shares([mask], held).sum()
             if number in taken or covered >= _NEW_COVERED or mask.area < max(_PIECE * nursery.smallest, 1):
                 continue
-        lost = _found_again(nursery, targets, mask, sight, identity)
+        lost = _found_again(nursery, targets, mask, sight, identity, frame.time)
         if lost is not None:
             was = targets[lost]
             new = _newborn(nursery, mask, sight, regions, number, frame, was.key, identity or was.id)
@@ -96,29 +99,36 @@ def births(
             if identity and identity != was.id:
                 events.append(Event("entered", frame.index, frame.index, (identity,)))
             continue
+        known = awaited(mask, before, _SAME)
+        comer = known or Waiting.first(zones, mask, frame.time)
         if not identity:
-            if mask.area < nursery.smallest:
+            if mask.area < nursery.smallest or not np.isfinite(comer.evidence):
                 continue
-            if waiting is not None and not (mask_shares([mask], before) > _SAME).any():
-                wait.append(mask)
+            if waiting is not None and not (known and comer.is_due(frame.time)):
+                wait.append(comer)
                 continue
         identity = identity or next_id
         next_id = max(next_id, identity + 1)
         born.append(_newborn(nursery, mask, sight, regions, number, frame, next_key + len(born), identity))
-        events.append(Event("entered", frame.index, frame.index, (identity,)))
+        events.append(Event("entered", frame.index, frame.index, (identity,), zones.name(comer.entry)))
     if not observations:  # a frame in which nothing was looked for: who waits goes on waiting
         wait = list(before)
     return Born([*targets, *born], len(born), tuple(wait), events)
 
 
-def _found_again(nursery: Nursery, targets: list[Target], mask: Mask, sight: Sight, identity: int) -> int | None:
+def _found_again(
+    nursery: Nursery, targets: list[Target], mask: Mask, sight: Sight, identity: int, time: float
+) -> int | None:
     """Return which object an observation is, if any: the one of that id, the one marked now, a lost one like it."""
     if identity:
         same = [number for number, one in enumerate(targets) if one.id == identity]
         return same[0] if same else _found_there(targets, mask)
     best, least = None, _ALIKE
     for number, one in enumerate(targets):
-        if one.missed <= 0 or mask.area > _SIMILAR * one.mean or not _within_reach(one, mask):
+        if one.missed <= 0 or mask.area > _SIMILAR * one.mean:
+            continue
+        verdict = one.last_seen.verdict(nursery.zones, mask.box, one.missed)
+        if verdict == FORBIDDEN or not (verdict == EXPECTED or _within_reach(one, mask)):
             continue
         points = colours_of(sight, mask)
         likeness = float(of_colours(points, one.first, one.last, nursery.trust, nursery.bound).mean())

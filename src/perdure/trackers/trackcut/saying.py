@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from perdure.features.masks import disjoint, holding
+from perdure.scene.zones import Zones
 from perdure.trackers.trackcut.targets import Target
 from perdure.types import Event, Frame, Status, Tracks
 
@@ -18,14 +19,16 @@ def has_left(target: Target, size: tuple[int, int]) -> bool:
     return target.missed > 0 and not (0 <= x < size[1] and 0 <= y < size[0])
 
 
-def gone(target: Target, frame: Frame, size: tuple[int, int]) -> Event:
+def gone(target: Target, frame: Frame, size: tuple[int, int], zones: Zones) -> Event:
     """Return what is told of an object that is let go."""
-    left = has_left(target, size)
-    why = "over the border" if left else "not seen again inside the picture"
-    return Event("left" if left else "lost", frame.index, frame.index, (target.id,), why=why)
+    out, by = has_left(target, size), target.last_seen.exit(zones)
+    kind = "left" if out or by >= 0 else "lost"
+    why = "over the border" if out else "through an exit" if by >= 0 else "not seen again inside the picture"
+    zone = zones.name(by if kind == "left" else target.last_seen.behind)
+    return Event(kind, frame.index, frame.index, (target.id,), zone, why=why)
 
 
-def happenings(before: tuple[Target, ...], now: list[Target], frame: Frame) -> list[Event]:
+def happenings(before: tuple[Target, ...], now: list[Target], frame: Frame, zones: Zones) -> list[Event]:
     """Return who has become hidden, and who is seen again."""
     old = {one.key: one for one in before}
     events = []
@@ -34,11 +37,11 @@ def happenings(before: tuple[Target, ...], now: list[Target], frame: Frame) -> l
         if was is None:
             continue
         if was.missed == 0 < one.missed:
-            events.append(Event("occluded", frame.index, frame.index, (one.id,), why="no pixel of it is seen"))
+            zone, why = zones.name(one.last_seen.behind), "no pixel of it is seen"
+            events.append(Event("occluded", frame.index, frame.index, (one.id,), zone, why=why))
         elif was.missed > 0 == one.missed:
-            events.append(
-                Event("found_again", frame.index, frame.index, (one.id,), why="it is seen where it should be")
-            )
+            zone, why = zones.name(was.last_seen.behind), "it is seen where it should be"
+            events.append(Event("found_again", frame.index, frame.index, (one.id,), zone, why=why))
         elif one.partly and not was.partly:
             events.append(
                 Event("partly_occluded", frame.index, frame.index, (one.id,), why="smaller by more than 3 σ")

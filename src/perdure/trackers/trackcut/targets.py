@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths.mixture import Mixture
+from perdure.scene.whereabouts import NOWHERE, Whereabouts
 from perdure.types import Mask
 
 RECENT = 15  # frames whose motions are remembered: longer than a stride
@@ -83,3 +84,4 @@ class Target:
     pieces: float  # frames for which it has held several regions
     squeezed: int  # frames for which it has had a small share of what is another's silhouette
     marked: bool  # whether the user marked it, so that its first looks are surely its own
+    last_seen: Whereabouts = NOWHERE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from perdure.features.masks import silhouettes
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
 from perdure.scene.backdrop import Backdrop, carried, learn
+from perdure.scene.whereabouts import Waiting
+from perdure.scene.zones import Zones, counting, renumbered
 from perdure.trackers.trackcut.births import Nursery, births
 from perdure.trackers.trackcut.companies import companies, company_of, hosts, sharing
 from perdure.trackers.trackcut.competing import Claim, claims
@@ -26,7 +29,7 @@ from perdure.trackers.trackcut.seeing import Motion, Sight, colours_of, covered,
 from perdure.trackers.trackcut.separating import clusters, separate
 from perdure.trackers.trackcut.shapes import to_shape
 from perdure.trackers.trackcut.targets import Shape, Target
-from perdure.types import Event, Frame, Mask, Regions, Report, Scene
+from perdure.types import Event, Frame, Image, Mask, Regions, Report, Scene
 
 Float = NDArray[np.float32]
 # Evidence of an observation for its pixels, against that of none: shared, its own, its own while the object comes in.
@@ -43,7 +46,7 @@ class TrackCutState:
     """All objects, and the frame before."""
 
     targets: tuple[Target, ...]
-    waiting: tuple[Mask, ...]  # observations of the frame before that were nobody's
+    waiting: tuple[Waiting, ...]  # observations of the frame before that were nobody's
     colours: NDArray[np.uint8]  # (H, W, 3) of the frame before; (0, 0, 3) before the first
     grey: NDArray[np.uint8]  # (h, w)
     next_key: int
@@ -51,6 +54,7 @@ class TrackCutState:
     time: float  # s
     size: tuple[int, int]  # height, width
     backdrop: Backdrop  # in Lab, as `colours`
+    zones: Zones
 
 
 @dataclass(frozen=True)
@@ -106,13 +110,21 @@ class TrackCut:
             0.0,
             (scene.height, scene.width),
             Backdrop.unknown(scene.height, scene.width),
+            Zones.of(scene),
         )
 
     def step(self, state: TrackCutState, frame: Frame, regions: Regions) -> tuple[TrackCutState, Report]:
         """Predict and cut out every object, separate those that overlap, learn, find new ones, say."""
         if frame.image is None:
             return replace(state, time=frame.time), Report()
-        sight = look_at(frame.image)
+        after, report, numbers = counting(state.zones, regions, partial(self._step, state, frame, frame.image))
+        return after, replace(report, rows=renumbered(report.rows, frame.index, numbers))
+
+    def _step(
+        self, state: TrackCutState, frame: Frame, image: Image, regions: Regions
+    ) -> tuple[TrackCutState, Report]:
+        """Step on the regions that count."""
+        sight, zones = look_at(image), state.zones
         observations = silhouettes(regions, *state.size)
         targets = list(state.targets)
         events: list[Event] = []
@@ -128,6 +140,7 @@ class TrackCut:
             self.trust,
             self.bound,
             state.backdrop,
+            zones,
         )
         waiting = state.waiting if len(state.colours) else None
         keys = (state.next_key, state.next_id)
@@ -136,14 +149,17 @@ class TrackCut:
         next_id = max([state.next_id, *(one.id + 1 for one in targets[len(targets) - born.new :])])
         kept = []
         for one in targets:
-            if one.missing > self.hidden_for + 1e-9 or has_left(one, state.size):
-                events.append(gone(one, frame, state.size))
+            seen = one.mask.box if one.missed == 0 else None
+            one = replace(one, last_seen=one.last_seen.after(zones, seen, one.shape.box))
+            out = has_left(one, state.size) and one.last_seen.behind < 0
+            if one.missing > one.last_seen.kept(zones, self.hidden_for, out) + 1e-9 or out:
+                events.append(gone(one, frame, state.size, zones))
             else:
                 kept.append(one)
         things = [*(one.mask for one in kept), *(one.shape.to_mask() for one in kept), *observations]
         learn(state.backdrop, sight.colours, covered(things, state.size, _BESIDE))
         rows = rows_of(kept, frame, state.size, self.hidden_for)
-        events += happenings(state.targets, kept, frame)
+        events += happenings(state.targets, kept, frame, zones)
         state = TrackCutState(
             tuple(kept),
             born.waiting,
@@ -154,6 +170,7 @@ class TrackCut:
             frame.time,
             state.size,
             state.backdrop,
+            zones,
         )
         return state, Report(rows, events=tuple(events))
 
@@ -226,7 +243,10 @@ class TrackCut:
                 squeezed=squeezed[number],
             )
             seen = Seen(expected, mask, others, matched, shared[number], motion, waited, bool(observations), blind)
-            after.append(learnt(target, seen, self.components))
+            now = learnt(target, seen, self.components)
+            if _is_forbidden(state.zones, target, now, waited):
+                now = learnt(target, seen._replace(mask=Mask.empty(), links=()), self.components)
+            after.append(now)
         asked = {one.key: colours_of(sight, one.mask) for one in after if one.company and one.alone >= ALONE}
         return parted(after, asked, frame)
 
@@ -298,6 +318,12 @@ class TrackCut:
             for k, mask in zip(some, parts, strict=True):
                 masks[k] = mask
         return masks
+
+
+def _is_forbidden(zones: Zones, was: Target, now: Target, waited: float) -> bool:
+    """Whether an object that was lost is found where a rule forbids it."""
+    found = was.missed > 0 == now.missed and now.mask.area > 0
+    return found and was.last_seen.is_forbidden(zones, now.mask.box, was.missed + waited)
 
 
 def _elsewhere(others: list[Mask], expected: Expected) -> Float:
