@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -97,6 +99,13 @@ def test_regions_that_lie_half_in_what_is_ignored_do_not_count():
     assert place(screen).counted(boxes((40, 0, 60, 20), (41, 0, 61, 20))).tolist() == [False, True]
 
 
+def test_what_is_ignored_twice_is_not_twice_as_much():
+    twice = [Zone("ignore", name, rectangle(0, 0, 50, 60)) for name in "ab"]
+    beside = [Zone("ignore", name, rectangle(x, 0, x + 10, 60)) for name, x in (("a", 40), ("b", 50))]
+    assert place(*twice).counted(boxes((44, 0, 64, 20))).tolist() == [True]
+    assert place(*beside).counted(boxes((44, 0, 64, 20))).tolist() == [False]
+
+
 def test_who_is_lost_at_an_occluder_or_goes_into_it_is_behind_it():
     before, far, going = (30, 10, 44, 40), (10, 10, 20, 40), (40, 10, 50, 40)
     behind = place(LEFT, POST).behind(boxes(before, far, going), boxes(going, far, going))
@@ -115,6 +124,8 @@ def test_how_long_the_lost_are_kept():
     behind, leaving = np.array([-1, -1, -1, 0, -1]), np.array([False] * 4 + [True])
     kept = place(POST, out, dark).kept(rows, behind, np.full(5, 2.0), leaving)
     assert kept.tolist() == [0.5, 4.0, 6.0, 10.0, 2.0], "exit, elsewhere, dark, behind, over the border"
+    short = place(replace(POST, patience=1.0), out, dark).kept(rows, behind, np.full(5, 2.0), leaving)
+    assert short[3] == 2.0, "an occluder never shortens"
     rule = Rule("out", "post", within=20)
     assert place(POST, out, rules=(rule,)).kept(rows[:1], behind[:1], np.full(1, 2.0), leaving[:1]).tolist() == [
         20.0

@@ -24,7 +24,7 @@ zone. Boxes are taken as far as they lie in the picture, so that a zone along th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
@@ -174,39 +174,31 @@ class Zones:
 
     # Where ------------------------------------------------------------------------------------------------------
 
-    def holding(self, points: NDArray[Any]) -> Bools:
-        """Return which zones hold which points: (N, Z) of points (N, 2)."""
+    def holding(self, points: NDArray[Any], kinds: Sequence[str] | None = None) -> Bools:
+        """Return which zones hold which points: (N, Z) of points (N, 2); none but those of some kinds, if they are named."""
         import shapely
 
         points = np.asarray(points, np.float64)
         found = np.zeros((len(points), len(self.zones)), np.bool_)
-        for number, shape in enumerate(self._shapes):
-            found[:, number] = shapely.intersects_xy(shape, points[:, 0], points[:, 1])
+        for number in self._of(kinds):
+            found[:, number] = shapely.intersects_xy(self._shapes[number], points[:, 0], points[:, 1])
         return found
 
-    def shares(self, boxes: Boxes) -> Float:
-        """Return the share of each box (N, 4) in each zone (N, Z); 0 of a box without area."""
-        import shapely
-
+    def shares(self, boxes: Boxes, kinds: Sequence[str] | None = None) -> Float:
+        """Return the share of each box (N, 4) in each zone (N, Z), of some kinds if they are named; 0 without area."""
         inside = self._inside(boxes)
-        area = (inside[:, 2] - inside[:, 0]) * (inside[:, 3] - inside[:, 1])  # (N,)
         found = np.zeros((len(inside), len(self.zones)))
-        for number, (shape, limits) in enumerate(zip(self._shapes, self._limits, strict=True)):
-            near = np.flatnonzero(
-                (inside[:, :2] < limits[2:]).all(axis=1) & (inside[:, 2:] > limits[:2]).all(axis=1)
-            )
-            if len(near):
-                shared = shapely.area(shapely.intersection(shapely.box(*inside[near].T), shape))
-                found[near, number] = shared / np.maximum(area[near], 1e-9)
-        return np.minimum(found, 1.0)
+        for number in self._of(kinds):
+            found[:, number] = _shares(inside, self._shapes[number], self._limits[number])
+        return found
 
-    def within(self, boxes: Boxes) -> Bools:
-        """Return which boxes (N, 4) are in which zones (N, Z): their foot is, or half of them."""
-        return np.asarray(self.holding(self._feet(boxes)) | (self.shares(boxes) >= HALF))
+    def within(self, boxes: Boxes, kinds: Sequence[str] | None = None) -> Bools:
+        """Return which boxes (N, 4) are in which zones (N, Z), of some kinds if they are named: by foot, or by half."""
+        return np.asarray(self.holding(self._feet(boxes), kinds) | (self.shares(boxes, kinds) >= HALF))
 
     def first(self, boxes: Boxes, kind: str) -> Index:
         """Return in which zone of a kind each box (N, 4) is; of several the first, -1 for none."""
-        return self._first(self.within(boxes) if self.has(kind) else np.zeros((len(boxes), 0), np.bool_), kind)
+        return self._first(self.within(boxes, (kind,)), kind)
 
     # What a tracker asks ----------------------------------------------------------------------------------------
 
@@ -214,7 +206,9 @@ class Zones:
         """Return which regions (N,) count: less than half of them lies in what is to be ignored."""
         if not self.has("ignore"):
             return np.ones(len(boxes), np.bool_)
-        return np.asarray(self.shares(boxes)[:, self._numbers["ignore"]].sum(axis=1) < HALF)
+        import shapely
+
+        return np.asarray(_shares(self._inside(boxes), self._ignored, shapely.bounds(self._ignored)) < HALF)
 
     def evidence(self, boxes: Boxes) -> Float:
         """Return for how many seconds (N,) newcomers first seen at boxes (N, 4) must be seen; inf: nobody comes in there.
@@ -225,21 +219,22 @@ class Zones:
         wait = np.zeros(len(boxes))
         if not len(boxes) or not (self.has("entry") or self.has("noise") or self.has("ground")):
             return wait
-        within = self.within(boxes)
+        within = self.within(boxes, ("entry", "noise"))
         if self.has("entry"):
             elsewhere = ~within[:, self._numbers["entry"]].any(axis=1)
             wait[elsewhere] = max(self.zones[number].evidence or 0.0 for number in self._numbers["entry"])
         for number in self._numbers.get("noise", ()):
             wait = np.where(within[:, number], np.maximum(wait, self.zones[number].evidence or 0.0), wait)
         if self.has("ground"):
-            wait[~self.holding(self._feet(boxes))[:, self._numbers["ground"]].any(axis=1)] = np.inf
+            wait[~self.holding(self._feet(boxes), ("ground",))[:, self._numbers["ground"]].any(axis=1)] = np.inf
         return wait
 
     def behind(self, seen: Boxes, expected: Boxes) -> Index:
         """Return behind which occluder (N,) lost targets may be, by where they were seen last and are expected; else -1."""
         if not self.has("occlusion") or not len(seen):
             return np.full(len(seen), -1, np.intp)
-        shares = np.maximum(self.shares(seen), self.shares(expected))[:, self._numbers["occlusion"]]
+        one, other = (self.shares(boxes, ("occlusion",)) for boxes in (seen, expected))
+        shares = np.maximum(one, other)[:, self._numbers["occlusion"]]
         best = shares.argmax(axis=1)
         found = shares[np.arange(len(seen)), best] >= _HIDING
         return np.where(found, np.asarray(self._numbers["occlusion"])[best], -1)
@@ -268,15 +263,16 @@ class Zones:
         """
         if not len(boxes):
             return usual
-        within = self.within(boxes)
-        kept = usual * self._times(boxes, "low-contrast", "longer", within)
+        within = self.within(boxes, None if self.rules else ("exit", "low-contrast"))
+        times = self._times(boxes, "low-contrast", "longer", within)
+        kept = usual * times
         for number in self._numbers.get("occlusion", ()):
             kept = np.where(behind == number, np.maximum(kept, self.zones[number].patience or 0.0), kept)
         exits = self._numbers.get("exit", ())
         if exits:
             through = self._first(within, "exit")
             longer = max(self.zones[number].longer or 1.0 for number in exits)
-            kept = np.where((through < 0) & (kept == usual) & ~leaving, usual * longer, kept)
+            kept = np.where((through < 0) & (behind < 0) & (times == 1) & ~leaving, usual * longer, kept)
             for number in exits:
                 kept = np.where(through == number, self.zones[number].patience or 0.0, kept)
         for rule in self.rules:
@@ -355,6 +351,13 @@ class Zones:
         return shapes
 
     @cached_property
+    def _ignored(self) -> Any:
+        """All that is to be ignored, as one geometry."""
+        import shapely
+
+        return shapely.union_all([self._shapes[number] for number in self._numbers["ignore"]])
+
+    @cached_property
     def _limits(self) -> Float:
         import shapely
 
@@ -371,6 +374,12 @@ class Zones:
     @cached_property
     def _named(self) -> dict[str, int]:
         return {zone.name: number for number, zone in enumerate(self.zones)}
+
+    def _of(self, kinds: Sequence[str] | None) -> Iterable[int]:
+        """The numbers of the zones of some kinds; of all, if none is named."""
+        if kinds is None:
+            return range(len(self.zones))
+        return [number for kind in kinds for number in self._numbers.get(kind, ())]
 
     def _inside(self, boxes: Boxes) -> Float:
         """Boxes (N, 4) as far as they lie in the picture."""
@@ -396,7 +405,7 @@ class Zones:
         """The largest setting (N,) of the zones of a kind that boxes (N, 4) are in; 1 for none."""
         times = np.ones(len(boxes))
         if self.has(kind) and len(boxes):
-            within = self.within(boxes) if within is None else within
+            within = self.within(boxes, (kind,)) if within is None else within
             for number in self._numbers[kind]:
                 times = np.where(within[:, number], np.maximum(times, getattr(self.zones[number], setting)), times)
         return times
@@ -440,6 +449,19 @@ def shape_of(polygons: Sequence[Polygon]) -> Any:
 
     shapes = [shapely.Polygon(rings[0], rings[1:]) for rings in polygons]
     return shapes[0] if len(shapes) == 1 else shapely.MultiPolygon(shapes)
+
+
+def _shares(boxes: Float, shape: Any, limits: Float) -> Float:
+    """The share (N,) of each box (N, 4) in a geometry whose bounds are x1 y1 x2 y2."""
+    import shapely
+
+    found = np.zeros(len(boxes))
+    near = np.flatnonzero((boxes[:, :2] < limits[2:]).all(axis=1) & (boxes[:, 2:] > limits[:2]).all(axis=1))
+    if len(near):
+        area = (boxes[near, 2] - boxes[near, 0]) * (boxes[near, 3] - boxes[near, 1])
+        shared = shapely.area(shapely.intersection(shapely.box(*boxes[near].T), shape))
+        found[near] = np.minimum(shared / np.maximum(area, 1e-9), 1.0)
+    return found
 
 
 def _checked(zone: Zone, name: str, value: float | None) -> float | None:
