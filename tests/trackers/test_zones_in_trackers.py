@@ -297,3 +297,28 @@ def test_zones_that_nobody_is_in_change_nothing(tracker: str):
     plain, zoned = told(tracker, world), told(tracker, world, idle)
     assert plain.tracks.equals(zoned.tracks)
     assert plain.events == zoned.events
+
+
+# With pictures ----------------------------------------------------------------------------------------------
+
+
+def test_of_two_behind_an_occluder_colours_tell_who_comes_out():
+    """Red goes behind the wall, then blue; blue comes out first, after longer than anybody is remembered elsewhere."""
+
+    def path(begin: int, back: int) -> Path:
+        return lambda k: (
+            None if k < begin else (min(4 + 2 * (k - begin), 60) if k < back else 60 + 2 * (k - back), 30)
+        )
+
+    red, blue = Block(path(3, 106)), Block(path(14, 92), colour=(40, 60, 220))
+    world = World((red, blue, wall(48, 82)), count=124, zones=(WALL,))
+    tracks, events = _with_pictures(world)
+    assert np.unique(tracks.ids).tolist() == [1, 2]
+    assert [one.ids for one in events if one.kind == "found_again"] == [(2,), (1,)]
+    plain, _ = _with_pictures(replace(world, zones=()))
+    assert len(np.unique(plain.ids)) == 4
+
+
+def _with_pictures(world: World) -> tuple[Tracks, list[Event]]:
+    steps = list(track(world.seen(), TRACKERS["compound"](), world.scene))
+    return settle(step.report for step in steps), [event for step in steps for event in step.report.events]
