@@ -97,6 +97,14 @@ def test_from_pixels_who_appears_outside_all_entries_is_born_after_a_second(trac
     assert told(tracker, by_door, (DOOR,)).of("entered") == [("entered", 4, (1,), "door")]
 
 
+def test_who_parts_from_somebody_came_in_with_him():
+    """Two come in by the door as one region and part in the middle, less than a second before the film ends."""
+    upper = Block(lambda k: (5 + 2 * k, 20 - max(k - 20, 0)))
+    lower = Block(lambda k: (5 + 2 * k, 36 + max(k - 20, 0)), colour=(40, 60, 220))
+    said = _with_pictures(World((upper, lower), count=36, zones=(DOOR,)))[0]
+    assert len(np.unique(said.in_frame(35).ids)) == 2
+
+
 # Exits ------------------------------------------------------------------------------------------------------
 
 

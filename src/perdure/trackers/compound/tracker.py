@@ -162,7 +162,7 @@ class Compound:
         if len(births):
             boxes, scores, classes = regions.boxes[births], regions.scores[births], regions.classes[births]
             new = newborn(frame, boxes, scores, classes, meeting.next_key)
-            targets = targets.join(placed(zones, new, boxes))
+            targets = targets.join(placed(zones, new, boxes, state.targets, state.early))
         region = np.concatenate([meeting.region, births])
         waited = 0.0 if regions.blind else time - state.time
         targets = _waited(targets, region, held, waited, frame.index)

@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.appearance import alike, signature
+from perdure.features.boxes import areas, intersections
 from perdure.maths.assign import assign
 from perdure.scene.zones import ANYWHERE, FORBIDDEN, Zones
 from perdure.trackers.compound.matrix import Place
 from perdure.trackers.compound.recalling import Found, came_in, given
 from perdure.trackers.compound.targets import Targets
-from perdure.types import Boxes, Event, Frame, Regions, Renamed
+from perdure.types import Boxes, Event, Frame, Regions, Renamed, Tracks
 
 Index = NDArray[np.intp]
 _COMPARED = 1.0  # s of age, up to which a new target is compared
+_PARTED = 0.7  # share of a newcomer in the box that somebody had before, from which he has parted from him
 _LESS = 0.8  # of the likeness that is asked for elsewhere
 
 
@@ -50,11 +52,22 @@ def coming_in(zones: Zones, births: Index, regions: Regions) -> Index:
     return births[np.isfinite(zones.evidence(regions.boxes[births]))] if zones and len(births) else births
 
 
-def placed(zones: Zones, newcomers: Targets, boxes: Boxes) -> Targets:
-    """Return new targets that know by which entry they came in, and for how long they must be seen."""
+def placed(zones: Zones, newcomers: Targets, boxes: Boxes, before: Targets, early: Tracks) -> Targets:
+    """Return new targets that know by which entry they came in, and for how long they must be seen.
+
+    Who parts from somebody came in with him, and needs no entry of his own: part of him was in somebody's box the frame
+    before, or in the regions, pieces included, of a young target (`remember`).
+    """
     if not zones or not len(newcomers):
         return newcomers
-    return newcomers.replace(evidence=zones.evidence(boxes), entry=zones.first(boxes, "entry").astype(np.int64))
+    named = before.boxes[(before.ids > 0) & (before.missed == 0)]
+    regions = early.boxes[early.frames == early.frames.max(initial=-1)]
+    shared = (
+        intersections(boxes, np.concatenate([named, regions])) / np.maximum(areas(boxes), 1.0)[:, None]
+    )  # (N, M)
+    parted = (shared >= _PARTED).any(axis=1) & ~zones.within(boxes, ("noise",)).any(axis=1)
+    evidence = np.where(parted, 0.0, zones.evidence(boxes))
+    return newcomers.replace(evidence=evidence, entry=zones.first(boxes, "entry").astype(np.int64))
 
 
 def returned(zones: Zones, targets: Targets, region: Index, frame: Frame, confirm: float, least: float) -> Found:
