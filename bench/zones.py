@@ -134,11 +134,10 @@ def table(told: Sequence[Told]) -> Table:
             *(f"{100 * one.figures[name]:.1f}" for name in FIGURES[:2]),
             *(f"{one.figures[name]:.0f}" for name in FIGURES[2:]),
             str(one.ids),
-            f"{one.rate:.0f}",
         ]
         for one in told
     ]
-    head = ["tracker", "regions", "zones", "MOTA", "IDF1", "switches", "fragments", "ids", "frames/s"]
+    head = ["tracker", "regions", "zones", "MOTA", "IDF1", "switches", "fragments", "ids"]
     return Table(f"{CLIP}: MOTA and IDF1 in percent", head, rows)
 
 
