@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from perdure import fold, params
 from perdure.detect import DETECTORS, Mark, Marked, Recorded, WithMarks
 from perdure.errors import DamagedVideo, FormatError, ParameterError
+from perdure.files.calibration import read_calibration
 from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
 from perdure.files.shapes import is_file
 from perdure.files.video import Source, open_source
+from perdure.scene.ground import Ground
+from perdure.scene.placing import Paths, placed
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
 
@@ -102,7 +105,8 @@ class Plan:
     def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
         """Yield every step of the run, the finishing one last."""
         given = self.source if frames is None else frames
-        return fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
+        steps = fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
+        return steps if self.scene.ground is None else _placed(steps, self.scene.ground)
 
     def _whole(self) -> Any:
         """The detector, with the marks beside it."""
@@ -127,6 +131,7 @@ def plan(
     end: str | float | None = None,
     stride: int = 1,
     roi: str | None = None,
+    calibration: str | Path | None = None,
     classes: str | Collection[str] | None = (),
     parameters: Mapping[str, object] | None = None,
 ) -> Plan:
@@ -153,6 +158,8 @@ def plan(
         Take every n-th frame.
     roi : str or None
         Where things may be seen: an image, a polygon, a box or a file of polygons.
+    calibration : str, Path or None
+        A calibration file of the ground plane: places are then told in metres.
     classes : str or collection of str
         Only regions of these classes.
     parameters : mapping
@@ -178,6 +185,9 @@ def plan(
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
+        if calibration is not None:
+            ground = read_calibration(calibration, opened.width, opened.height)
+            scene = dataclasses.replace(scene, ground=ground)
         marks: tuple[Mark, ...] = ()
         if init is not None and words:
             _refuse_late_start(opened, start)
@@ -195,6 +205,14 @@ def plan(
     return made
 
 
+def _placed(steps: Iterable[fold.Step], ground: Ground) -> Iterator[fold.Step]:
+    """The steps, their rows with places and speeds on the ground."""
+    paths = Paths.none()
+    for step in steps:
+        paths, rows = placed(ground, paths, step.report.rows)
+        yield step._replace(report=dataclasses.replace(step.report, rows=rows))
+
+
 def track(source: AnySource, **options: Any) -> Tracks:
     """Track every moving thing in a source and return the settled tracks.
 
@@ -206,7 +224,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, classes; and parameters of the
+        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, calibration, classes; and parameters of the
         detector and the tracker by name.
 
     Raises
@@ -323,7 +341,19 @@ def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _OPTIONS = frozenset(
-    ("tracker", "detector", "init", "fps", "start", "end", "stride", "roi", "classes", "parameters")
+    (
+        "tracker",
+        "detector",
+        "init",
+        "fps",
+        "start",
+        "end",
+        "stride",
+        "roi",
+        "calibration",
+        "classes",
+        "parameters",
+    )
 )
 
 

@@ -52,6 +52,15 @@ RoiOption = Annotated[
         show_default=False,
     ),
 ]
+CalibrationOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--calibration",
+        metavar="FILE",
+        help="Where the ground plane lies, a JSON file: places are told in metres, speeds in m/s.",
+        show_default=False,
+    ),
+]
 ClassOption = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(

@@ -52,6 +52,7 @@ def track(
     detector: options.DetectorOption = None,
     init: options.InitOption = None,
     roi: options.RoiOption = None,
+    calibration: options.CalibrationOption = None,
     class_: options.ClassOption = None,
     fps: options.FpsOption = None,
     start: options.StartOption = None,
@@ -77,13 +78,18 @@ def track(
         end=end,
         stride=stride,
         roi=roi,
+        calibration=calibration,
         classes=class_ or (),
         parameters=given,
     )
     place = output or Path("perdure-runs") / made.source.name
-    inputs = [Path(one) for one in (source, detector, roi, parameters) if one is not None and is_file(one)]
+    inputs = [
+        Path(one) for one in (source, detector, roi, calibration, parameters) if one is not None and is_file(one)
+    ]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
+    if calibration is not None:
+        window["calibration"] = calibration
     outcome = run(made, folder, reporting, window=window, film=not no_video)
     show(outcome, folder, as_json=json_)
     if outcome.code:
@@ -222,7 +228,7 @@ class _Count:
 
 
 def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str, Any]:
-    source = made.source
+    source, ground = made.source, made.scene.ground
     return {
         "source": str(source.origin),
         "width": source.width,
@@ -234,4 +240,5 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
         "reporting": params.values(reporting),
+        **({} if ground is None else {"ground": ground.about()}),
     }

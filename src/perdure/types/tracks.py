@@ -36,11 +36,11 @@ class Status(enum.IntEnum):
 
 
 class Ground(NamedTuple):
-    """A place on the ground plane in metres and the speed there in metres per second."""
+    """A place on the ground plane in metres and the speed there in metres per second; None where not known yet."""
 
     x: float
     y: float
-    speed: float
+    speed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
