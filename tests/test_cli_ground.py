@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from perdure.cli.main import app
+from perdure.errors import ParameterError, PerdureError
+from perdure.files.calibration import read_calibration
 from perdure.files.runs import RunFolder
 from perdure.pipeline import plan
 from perdure.scene.ground import of_camera
@@ -76,3 +78,65 @@ def test_places_are_in_the_tracks_of_python_too(tmp_path, street):
     made = plan(street, calibration=tmp_path / "calibration.json")
     rows = next(step.report.rows for step in made.steps() if len(step.report.rows))
     assert all(place is not None for place in rows.ground)
+
+
+@pytest.fixture
+def square(tmp_path):
+    """A folder without images: forty people of 1.7 m who stroll about for 20 s, four times a second."""
+    folder = tmp_path / "square"
+    (folder / "det").mkdir(parents=True)
+    (folder / "seqinfo.ini").write_text(
+        "[Sequence]\nname=square\nframeRate=4\nseqLength=80\nimWidth=1280\nimHeight=720\n"
+    )
+    generator, lines = np.random.default_rng(1), []
+    start = np.stack([np.arange(-14, 15, 4).repeat(5), np.tile([9, 15, 22, 30, 40], 8)], axis=1).astype(float)
+    walk = generator.normal(0, 0.02, start.shape)
+    for frame in range(80):
+        places = start + walk * frame / 4
+        foot, head = GROUND.seen(places), GROUND.seen(places, 1.7)
+        for (x, y), (_, top) in zip(foot, head, strict=True):
+            tall = y - top
+            lines.append(f"{frame + 1},-1,{x - tall / 6 + 1:.2f},{top + 1:.2f},{tall / 3:.2f},{tall:.2f},1")
+    (folder / "det/det.txt").write_text("\n".join(lines))
+    return folder
+
+
+def test_the_ground_is_estimated_in_a_first_look_and_noted(tmp_path, square):
+    run = tmp_path / "run"
+    track(square, "-o", run, "--calibration", "auto", "--no-video")
+    about = json.loads((run / "run.json").read_text())
+    assert about["ground"]["origin"] == "video"
+    assert about["ground"]["calibration"]["camera"]["height"] == pytest.approx(6.0, rel=0.4)
+    assert '"ground":[' in (run / "tracks.jsonl").read_text()
+
+
+def test_the_estimate_is_written_and_read_and_of_a_source_or_of_its_run(tmp_path, square):
+    written = tmp_path / "written.json"
+    app(["calibrate", str(square), "-o", str(written), "--focal", "900"], standalone_mode=False)
+    camera = json.loads(written.read_text())["camera"]
+    assert camera["height"] == pytest.approx(6.0, rel=0.08)
+    assert camera["tilt_degrees"] == pytest.approx(22, abs=1)
+    ground = read_calibration(written, *SIZE)
+    assert ground.places([[640, 500]]) == pytest.approx(GROUND.places([[640, 500]]), rel=0.08, abs=0.1)
+    assert ground.spread([[640, 500]], 0.0).any()
+    track(square, "-o", tmp_path / "run", "--tracker", "overlap", "--no-video")
+    again = tmp_path / "again.json"
+    app(["calibrate", str(tmp_path / "run"), "-o", str(again), "--focal", "900"], standalone_mode=False)
+    assert json.loads(again.read_text())["camera"] == camera
+
+
+def test_who_cannot_be_estimated_is_told_why(tmp_path, street):
+    with pytest.raises(PerdureError, match=r"not enough: 2 upright people.*write a calibration file"):
+        app(["calibrate", str(street), "-o", str(tmp_path / "none.json")], standalone_mode=False)
+    assert not (tmp_path / "none.json").exists()
+    track(street, "-o", tmp_path / "run", "--calibration", "auto", "--no-video")
+    about = json.loads((tmp_path / "run/run.json").read_text())
+    assert "ground" not in about
+    assert "the ground plane is not known (not enough" in about["warnings"][0]
+
+
+def test_a_height_without_an_estimate_is_refused(street):
+    with pytest.raises(ParameterError, match="goes with --calibration auto"):
+        plan(street, object_height=1.5)
+    with pytest.raises(ParameterError, match=r"0\.05 to 20 m"):
+        plan(street, calibration="auto", object_height=-1.0)

@@ -23,11 +23,15 @@ from perdure.files.roi import read_roi
 from perdure.files.shapes import is_file
 from perdure.files.video import Source, open_source
 from perdure.scene.ground import Ground
+from perdure.scene.perspective import BODY, Estimate, estimate
 from perdure.scene.placing import Paths, placed
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
 
 _LEAST_COVER = 0.2  # of the frames: detections for fewer are worth a note
+_SURE = 0.5  # score of regions that tell of the ground
+LOOKED = 120.0  # s of a film in which people tell of the ground
+AUTO = "auto"
 FIRST_LOOKS = 25  # frames spread over a file that a detector may see first
 
 AnySource = str | Path | int | Iterable[NDArray[np.uint8]]
@@ -46,6 +50,8 @@ class Plan:
     classes: tuple[str, ...]
     init: tuple[str, ...] = ()  # what the user marked, in words
     marks: tuple[Mark, ...] = ()  # what he marked beside the detector's regions
+    body: float = 0.0  # m that people are high; above 0 where the ground is to be estimated from them
+    estimate: Estimate | None = None  # what they told of it
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -62,7 +68,36 @@ class Plan:
             )
 
     def prepared(self) -> Plan:
-        """Return the plan with the detector's first look over the source taken, where both allow it."""
+        """Return the plan with the first looks over the source taken: the detector's, and that for the ground."""
+        looked = self._with_detector()
+        return looked if not looked.body else looked._with_ground()
+
+    def people(self) -> Tracks:
+        """Return the rows of who goes about in the first `LOOKED` seconds, by overlap alone; of sure regions only."""
+
+        def sure(regions: Regions) -> Regions:
+            return self._wanted(regions.take(regions.scores >= _SURE))
+
+        begin: list[float] = []
+
+        def early() -> Iterator[Frame]:
+            for frame in self.source:
+                begin.append(frame.time)
+                if frame.time - begin[0] > LOOKED:
+                    return
+                yield frame
+
+        steps = fold.run(early(), self.detector, TRACKERS["overlap"](), self.scene, sure)
+        return fold.settle([step.report for step in steps])
+
+    def _with_ground(self) -> Plan:
+        """The plan with the ground that people tell, or the verdict why they do not."""
+        told = estimate(self.people(), (self.scene.width, self.scene.height), body=self.body)
+        scene = dataclasses.replace(self.scene, ground=told.ground)
+        return dataclasses.replace(self, scene=scene, body=0.0, estimate=told)
+
+    def _with_detector(self) -> Plan:
+        """The plan with the detector's first look taken, where it and the source allow it."""
         if not (self.source.rereadable and self.source.has_images and hasattr(self.detector, "prepare")):
             return self
         looked = self.detector.prepare(self.source.sample(FIRST_LOOKS))
@@ -70,7 +105,13 @@ class Plan:
 
     def notes(self) -> tuple[str, ...]:
         """Return what the user should know about how source, detections and tracker went together."""
-        return (*self._of_marks(), *self._of_detections())
+        return (*self._of_marks(), *self._of_detections(), *self._of_ground())
+
+    def _of_ground(self) -> tuple[str, ...]:
+        """What the user should know of the ground that was to be estimated."""
+        if self.estimate is None or not self.estimate.verdict:
+            return ()
+        return (f"the ground plane is not known ({self.estimate.verdict}); give --calibration FILE",)
 
     def _of_marks(self) -> tuple[str, ...]:
         """What the user should know about his marks."""
@@ -132,6 +173,7 @@ def plan(
     stride: int = 1,
     roi: str | None = None,
     calibration: str | Path | None = None,
+    object_height: float | None = None,
     classes: str | Collection[str] | None = (),
     parameters: Mapping[str, object] | None = None,
 ) -> Plan:
@@ -159,7 +201,10 @@ def plan(
     roi : str or None
         Where things may be seen: an image, a polygon, a box or a file of polygons.
     calibration : str, Path or None
-        A calibration file of the ground plane: places are then told in metres.
+        A calibration file of the ground plane: places are then told in metres. 'auto': estimated, in a first look
+        over the source, from people who walk on it.
+    object_height : float or None
+        With 'auto': metres that they are high on the mean; None for 1.7.
     classes : str or collection of str
         Only regions of these classes.
     parameters : mapping
@@ -185,7 +230,8 @@ def plan(
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
-        if calibration is not None:
+        body = _body(opened, calibration, object_height)
+        if calibration is not None and not body:
             ground = read_calibration(calibration, opened.width, opened.height)
             scene = dataclasses.replace(scene, ground=ground)
         marks: tuple[Mark, ...] = ()
@@ -197,12 +243,34 @@ def plan(
         if marks and follows_marks(made_tracker):
             made_tracker = dataclasses.replace(made_tracker, reserved=max(mark.id for mark in marks))
         wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
-        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words, marks)
+        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words, marks, body)
         made.check()
     except BaseException:
         opened.close()
         raise
     return made
+
+
+def _body(source: Source, calibration: str | Path | None, object_height: float | None) -> float:
+    """The height of people by which the ground is to be estimated; 0 where it is not."""
+    if str(calibration) != AUTO:
+        if object_height is not None:
+            raise ParameterError("--object-height goes with --calibration auto; leave it out")
+        return 0.0
+    if not source.rereadable:
+        raise ParameterError(
+            f"{source.name} passes only once, without a first look; `perdure calibrate RUN` makes a calibration of a run"
+        )
+    return check_body(object_height)
+
+
+def check_body(height: float | None) -> float:
+    """Return the height of people in metres, 1.7 if none is given; refuse what nobody is."""
+    if height is None:
+        return BODY
+    if not (isinstance(height, (int, float)) and 0.05 <= height <= 20.0):
+        raise ParameterError(f"object_height = {height!r} is out of range: it must be 0.05 to 20 m")
+    return float(height)
 
 
 def _placed(steps: Iterable[fold.Step], ground: Ground) -> Iterator[fold.Step]:
@@ -224,7 +292,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, calibration, classes; and parameters of the
+        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, calibration, object_height, classes; and parameters of the
         detector and the tracker by name.
 
     Raises
@@ -351,6 +419,7 @@ _OPTIONS = frozenset(
         "stride",
         "roi",
         "calibration",
+        "object_height",
         "classes",
         "parameters",
     )

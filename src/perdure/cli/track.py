@@ -21,6 +21,7 @@ from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
 from perdure.errors import OutputError
+from perdure.files.calibration import value_of
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
 from perdure.files.shapes import is_file
@@ -53,6 +54,7 @@ def track(
     init: options.InitOption = None,
     roi: options.RoiOption = None,
     calibration: options.CalibrationOption = None,
+    object_height: options.ObjectHeightOption = None,
     class_: options.ClassOption = None,
     fps: options.FpsOption = None,
     start: options.StartOption = None,
@@ -79,6 +81,7 @@ def track(
         stride=stride,
         roi=roi,
         calibration=calibration,
+        object_height=object_height,
         classes=class_ or (),
         parameters=given,
     )
@@ -89,7 +92,7 @@ def track(
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
     if calibration is not None:
-        window["calibration"] = calibration
+        window |= {"calibration": calibration, "object_height": object_height}
     outcome = run(made, folder, reporting, window=window, film=not no_video)
     show(outcome, folder, as_json=json_)
     if outcome.code:
@@ -154,7 +157,9 @@ def _run(
     live_film = film and not made.source.rereadable
     with RunLog(folder.log) as log:
         frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
-        steps: Iterable[Step] = ending.first_look(made).steps(frames)
+        made = ending.first_look(made)
+        about |= _ground(made)
+        steps: Iterable[Step] = made.steps(frames)
         if live_film:
             steps = drawn_while_running(steps, made.scene, folder.film)
         for step in steps:
@@ -228,7 +233,7 @@ class _Count:
 
 
 def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str, Any]:
-    source, ground = made.source, made.scene.ground
+    source = made.source
     return {
         "source": str(source.origin),
         "width": source.width,
@@ -240,5 +245,13 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
         "reporting": params.values(reporting),
-        **({} if ground is None else {"ground": ground.about()}),
+        **_ground(made),
     }
+
+
+def _ground(made: Plan) -> dict[str, Any]:
+    """What is known of the ground plane, and the estimate as a calibration file has it; nothing where nothing is."""
+    ground, told = made.scene.ground, made.estimate
+    if ground is None:
+        return {}
+    return {"ground": {**ground.about(), **({} if told is None else {"calibration": value_of(told, ground.size)})}}

@@ -17,6 +17,7 @@ from perdure.files.whole import whole_file
 from perdure.params import unknown_name
 from perdure.scene.ground import PIXEL, Ground, Unusable, of_camera, of_homography, of_projection
 from perdure.scene.lens import Lens
+from perdure.scene.perspective import Estimate
 from perdure.scene.points import of_distances, of_points
 
 FORMAT, VERSION = "perdure-calibration", 1
@@ -65,6 +66,23 @@ def calibration_of_json(value: Json, width: int, height: int) -> Ground:
     ground = _READERS[form](given, size)
     body = _number(given["body"], "body", low=0.0) if "body" in given else 0.0
     return ground if not body else dataclasses.replace(ground, body=body)
+
+
+def value_of(told: Estimate, size: tuple[int, int]) -> dict[str, Json]:
+    """Return the value of a calibration file that says what was estimated."""
+    return {
+        "frame": list(size),
+        "camera": {
+            "focal": round(told.focal, 3),
+            "height": round(told.height, 4),
+            "tilt_degrees": round(math.degrees(told.tilt), 5),
+            "roll_degrees": round(math.degrees(told.roll), 5),
+        },
+        "covariance": [[float(f"{one:.6g}") for one in row] for row in told.covariance],
+        "body": told.body,
+        "note": f"estimated from {told.people} people seen whole {told.rows} times; heights scatter by "
+        f"{100 * told.scatter:.1f} %",
+    }
 
 
 def write_calibration(path: Path, value: Mapping[str, Json]) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from perdure.scene.lens import Float, Lens
 
@@ -100,6 +100,11 @@ class Ground:
         `noise` is the standard deviation of the points in pixels, a number, (N,), or (N, 2) for x and y; the
         homography's own covariance is added.
         """
+        own = self._entries(self._straight(points))  # (N, 2, 9)
+        return np.asarray(self.jitter(points, noise) + own @ self.covariance @ own.transpose(0, 2, 1))
+
+    def jitter(self, points: ArrayLike, noise: ArrayLike = PIXEL) -> Float:
+        """Return the part (N, 2, 2) of `spread` that comes of the pixels: all that counts between two near points."""
         straight = self._straight(points)
         across = self._slopes(straight)  # (N, 2, 2): metres a pixel
         if self.lens is not None:
@@ -107,8 +112,7 @@ class Ground:
         given = np.asarray(noise, np.float64)
         deviation = np.broadcast_to(given if given.ndim == 2 else given.reshape(-1, 1), (len(straight), 2))
         scaled = across * deviation[:, None, :]
-        own = self._entries(straight)  # (N, 2, 9)
-        return np.asarray(scaled @ scaled.transpose(0, 2, 1) + own @ self.covariance @ own.transpose(0, 2, 1))
+        return np.asarray(scaled @ scaled.transpose(0, 2, 1), np.float64)
 
     def heights(self, boxes: ArrayLike) -> Float:
         """Return how high (N,) in metres the things in boxes (N, 4) are that stand on the ground.
@@ -119,7 +123,7 @@ class Ground:
         if not self.has_heights:
             return np.full(len(edges), np.nan)
         middle = (edges[:, 0] + edges[:, 2]) / 2
-        foot = self.places(np.stack([middle, edges[:, 3]], axis=1))
+        foot = self.places(feet(edges))
         top = self._straight(np.stack([middle, edges[:, 1]], axis=1))[:, 1]
         base = np.c_[foot, np.ones(len(foot))] @ np.linalg.inv(self.homography).T
         # (base + Z vertical) is seen in the row `top`
@@ -157,6 +161,12 @@ class Ground:
         found[:, 0, 0:3] = found[:, 1, 3:6] = ray
         found[:, :, 6:9] = -place[:, :, None] * ray[:, None, :]
         return found
+
+
+def feet(boxes: NDArray[np.floating]) -> Float:
+    """Return where things in boxes (N, 4) stand: the middle of the lower edge (N, 2)."""
+    wide = np.asarray(boxes, np.float64)
+    return np.stack([(wide[:, 0] + wide[:, 2]) / 2, wide[:, 3]], axis=1)
 
 
 def of_homography(

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.scene.ground import Ground
+from perdure.scene.ground import Ground, feet
 from perdure.types import Ground as Place
 from perdure.types import Status, Tracks
 
@@ -35,12 +35,6 @@ class Paths:
     def none() -> Paths:
         """Return the paths before the first row."""
         return Paths(MappingProxyType({}))
-
-
-def feet(boxes: NDArray[np.floating]) -> Float:
-    """Return where things in boxes (N, 4) stand: the middle of the lower edge (N, 2)."""
-    wide = np.asarray(boxes, np.float64)
-    return np.stack([(wide[:, 0] + wide[:, 2]) / 2, wide[:, 3]], axis=1)
 
 
 def placed(ground: Ground, paths: Paths, rows: Tracks) -> tuple[Paths, Tracks]:
