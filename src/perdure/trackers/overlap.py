@@ -16,6 +16,8 @@ from perdure.features.boxes import centres, overlaps
 from perdure.features.masks import disjoint, holding
 from perdure.maths.assign import assign
 from perdure.params import parameter
+from perdure.scene.ground import Ground
+from perdure.scene.reach import within_reach
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
 
 
@@ -33,6 +35,7 @@ class OverlapState:
     next_id: int
     time: float  # s, of the last frame
     scene_size: tuple[int, int]  # height, width
+    ground: Ground | None  # where it lies, if it is known and wanted
 
 
 @dataclass(frozen=True)
@@ -48,18 +51,42 @@ class Overlap:
     )
     inertia: float = parameter(0.3, "time over which speed is averaged", unit="s", low=0.0, high=60.0)
 
+    on_ground: bool = parameter(
+        True, "whether distances and sizes are compared in metres where the ground plane is known"
+    )
+    wander: float = parameter(
+        1.0,
+        "how fast a target may stray on the ground from where it is expected, where the plane is known",
+        unit="m/s",
+        low=0.0,
+        high=100.0,
+    )
+
     needs_pixels = False
 
     def start(self, scene: Scene) -> OverlapState:
         """Return the state without a target."""
         none, places = np.zeros(0), np.zeros((0, 4), np.float32)
         size = (scene.height, scene.width)
-        return OverlapState(none.astype(np.int64), places, places[:, :2], none, none, none, (), 1, 0.0, size)
+        return OverlapState(
+            none.astype(np.int64),
+            places,
+            places[:, :2],
+            none,
+            none,
+            none,
+            (),
+            1,
+            0.0,
+            size,
+            scene.ground if self.on_ground else None,
+        )
 
     def step(self, state: OverlapState, frame: Frame, regions: Regions) -> tuple[OverlapState, Report]:
         """Predict, match, update, give birth, say, retire."""
         overlap = overlaps(_expected(state, frame.time), regions.boxes)  # (N, M)
-        pairs, _, unmatched = assign(np.where(overlap >= self.least_overlap, 1.0 - overlap, np.inf))
+        cost = self._refused(state, np.where(overlap >= self.least_overlap, 1.0 - overlap, np.inf), frame, regions)
+        pairs, _, unmatched = assign(cost)
         state = self._update(state, frame.time, regions.boxes, pairs)
         state = _give_birth(state, frame.time, regions.boxes[unmatched])
         link = np.full(len(state.ids), -1)  # the region of each target
@@ -75,6 +102,19 @@ class Overlap:
     def finish(self, state: OverlapState) -> Report:
         """Return what is left to say: nothing."""
         return Report.empty()
+
+    def _refused(
+        self, state: OverlapState, cost: NDArray[np.floating], frame: Frame, regions: Regions
+    ) -> NDArray[np.floating]:
+        """The cost (N, M) with pairs forbidden that are too far apart on the ground, or too unlike in height."""
+        if state.ground is None:
+            return cost
+        rows, columns = np.nonzero(np.isfinite(cost))
+        elapsed = frame.time - state.seen[rows]
+        expected = _expected(state, frame.time)[rows]
+        near = within_reach(state.ground, expected, elapsed, regions.boxes[columns], self.wander)
+        cost[rows[~near], columns[~near]] = np.inf
+        return cost
 
     def _update(
         self, state: OverlapState, time: float, seen_boxes: Boxes, pairs: NDArray[np.intp]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from perdure.types import Boxes
 
 Float = NDArray[np.float32]
 Index = NDArray[np.intp]
+Possible = Callable[[Index, Index], NDArray[np.bool_]]
 
 
 class Thresholds(NamedTuple):
@@ -80,7 +82,13 @@ def near(regions: Boxes, targets: Boxes, farthest: float, size_ratio: float) -> 
 
 
 def match(
-    regions: Boxes, scores: Float, targets: Boxes, whole: NDArray[np.bool_], cost: Float, limits: Thresholds
+    regions: Boxes,
+    scores: Float,
+    targets: Boxes,
+    whole: NDArray[np.bool_],
+    cost: Float,
+    limits: Thresholds,
+    possible: Possible | None = None,
 ) -> Matched:
     """Find visible, ambiguous and lost targets.
 
@@ -98,11 +106,15 @@ def match(
         Added to the distance of targets that should come second.
     limits : Thresholds
         What makes a correspondence.
+    possible : function or None
+        Of rows of regions (K,) and of targets (K,): which pairs may correspond, for all that is known of the place.
     """
     sure = scores >= limits.sure
     weak = (scores >= limits.least) & ~sure
     entries = near(regions, targets, limits.distance, limits.size_ratio)
     allowed = entries.alike | whole[entries.target]
+    if possible is not None:
+        allowed &= whole[entries.target] | possible(entries.region, entries.target)
     worth = entries.distance + cost[entries.target]
     taken = np.full(len(regions), -1, np.intp)  # target of each region
     _one_to_one(taken, entries, worth, allowed & sure[entries.region], limits.distance + 1)
