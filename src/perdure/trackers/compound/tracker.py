@@ -234,7 +234,7 @@ class Compound:
             targets.temporary[active],
             cost[active].astype(np.float32),
             limits,
-            self._possible(state, expected, active, frame, regions),
+            None if blobs else self._possible(state, expected, active, frame, regions),
         )
         fresh = (targets.ids == 0) & (frame.time - targets.born < self.confirm)
         near = self.apart if blobs else -1.0
@@ -244,7 +244,10 @@ class Compound:
     def _possible(
         self, state: CompoundState, expected: Boxes, active: NDArray[np.intp], frame: Frame, regions: Regions
     ) -> Possible | None:
-        """Which regions may be which active targets for where they stand; None where the ground is not known."""
+        """Which boxes may be which active targets for where they stand; None where the ground is not known.
+
+        Not asked of silhouettes: one may hold several, or a piece, and stand where none of them stands.
+        """
         ground = state.ground
         if ground is None:
             return None
