@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -87,8 +88,11 @@ class Plan:
                     return
                 yield frame
 
-        steps = fold.run(early(), self.detector, TRACKERS["overlap"](), self.scene, sure)
-        return fold.settle([step.report for step in steps])
+        reports: list[Report] = []
+        with contextlib.suppress(DamagedVideo):  # what came before is enough; tracking will tell
+            for step in fold.run(early(), self.detector, TRACKERS["overlap"](), self.scene, sure):
+                reports.append(step.report)
+        return fold.settle(reports)
 
     def _with_ground(self) -> Plan:
         """The plan with the ground that people tell, or the verdict why they do not."""
