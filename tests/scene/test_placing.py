@@ -60,3 +60,13 @@ def test_who_is_not_seen_has_a_place_and_no_speed():
     assert rows.ground[0].x == pytest.approx(-2 + 1.4 * 0.95, abs=0.01)
     long_after, _ = placed(GROUND, after, frame.replace(ids=[8], times=[9.0]))
     assert set(long_after.of) == {8}  # nothing is kept for ever
+
+
+def test_the_table_has_columns_of_metres_where_any_are_known():
+    pytest.importorskip("pandas")
+    frame = next(walk([7], [[-2.0, 10]], [[1.4, 0]], [0.0]))
+    assert "ground_x" not in frame.to_pandas().columns
+    _, rows = placed(GROUND, Paths.none(), frame)
+    table = rows.to_pandas()
+    assert table["ground_x"].tolist() == pytest.approx([-2.0])
+    assert np.isnan(table["ground_speed"]).all()
