@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from perdure.draw import Trails, colour_of, paint
-from perdure.types import Frame, Mask, Outline, Scene, Status, Tracks
+from perdure.types import Frame, Ground, Mask, Outline, Scene, Status, Tracks
 
 SCENE = Scene(160, 120)
 
@@ -316,3 +316,17 @@ def test_a_contour_of_which_nothing_is_seen_is_dashed_all_round_and_may_leave_th
     picture = paint(Frame(0, 0.0, ground(128)), rows, Trails.empty(), SCENE)
     hidden = paint(Frame(0, 0.0, ground(128)), rows, Trails.empty(), SCENE, masks=False)
     assert (picture != hidden).any()
+
+
+def test_a_known_speed_is_written_beside_the_id():
+    def picture(*ground):
+        return paint(
+            Frame(0, 0.0, np.zeros((120, 160, 3), np.uint8)),
+            rows_of([[40, 50, 80, 110]], ground=ground),
+            Trails.empty(),
+            SCENE,
+        )
+
+    plain = picture(None)
+    assert np.array_equal(picture(Ground(3.0, 4.0)), plain)  # a place alone is not drawn
+    assert changed(picture(Ground(3.0, 4.0, 1.4)), 0).sum() > changed(plain, 0).sum() + 50

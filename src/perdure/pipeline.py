@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -16,17 +17,24 @@ from numpy.typing import NDArray
 from perdure import fold, params
 from perdure.detect import DETECTORS, Mark, Marked, Recorded, WithMarks
 from perdure.errors import DamagedVideo, FormatError, ParameterError
+from perdure.files.calibration import read_calibration
 from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
 from perdure.files.shapes import filled, is_file
 from perdure.files.video import Source, open_source
 from perdure.files.zones import read_zones
+from perdure.scene.ground import Ground
+from perdure.scene.perspective import BODY, Estimate, estimate
+from perdure.scene.placing import Paths, placed
 from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
 
 _LEAST_COVER = 0.2  # of the frames: detections for fewer are worth a note
+_SURE = 0.5  # score of regions that tell of the ground
+LOOKED = 120.0  # s of a film in which people tell of the ground
+AUTO = "auto"
 FIRST_LOOKS = 25  # frames spread over a file that a detector may see first
 
 AnySource = str | Path | int | Iterable[NDArray[np.uint8]]
@@ -45,6 +53,8 @@ class Plan:
     classes: tuple[str, ...]
     init: tuple[str, ...] = ()  # what the user marked, in words
     marks: tuple[Mark, ...] = ()  # what he marked beside the detector's regions
+    body: float = 0.0  # m that people are high; above 0 where the ground is to be estimated from them
+    estimate: Estimate | None = None  # what they told of it
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -61,7 +71,39 @@ class Plan:
             )
 
     def prepared(self) -> Plan:
-        """Return the plan with the detector's first look over the source taken, where both allow it."""
+        """Return the plan with the first looks over the source taken: the detector's, and that for the ground."""
+        looked = self._with_detector()
+        return looked if not looked.body else looked._with_ground()
+
+    def people(self) -> Tracks:
+        """Return the rows of who goes about in the first `LOOKED` seconds, by overlap alone; of sure regions only."""
+
+        def sure(regions: Regions) -> Regions:
+            return self._wanted(regions.take(regions.scores >= _SURE))
+
+        begin: list[float] = []
+
+        def early() -> Iterator[Frame]:
+            for frame in self.source:
+                begin.append(frame.time)
+                if frame.time - begin[0] > LOOKED:
+                    return
+                yield frame
+
+        reports: list[Report] = []
+        with contextlib.suppress(DamagedVideo):  # what came before is enough; tracking will tell
+            for step in fold.run(early(), self.detector, TRACKERS["overlap"](), self.scene, sure):
+                reports.append(step.report)
+        return fold.settle(reports)
+
+    def _with_ground(self) -> Plan:
+        """The plan with the ground that people tell, or the verdict why they do not."""
+        told = estimate(self.people(), (self.scene.width, self.scene.height), body=self.body)
+        scene = dataclasses.replace(self.scene, ground=told.ground)
+        return dataclasses.replace(self, scene=scene, body=0.0, estimate=told)
+
+    def _with_detector(self) -> Plan:
+        """The plan with the detector's first look taken, where it and the source allow it."""
         if not (self.source.rereadable and self.source.has_images and hasattr(self.detector, "prepare")):
             return self
         looked = self.detector.prepare(self.source.sample(FIRST_LOOKS))
@@ -69,7 +111,13 @@ class Plan:
 
     def notes(self) -> tuple[str, ...]:
         """Return what the user should know about how source, detections and tracker went together."""
-        return (*self._of_marks(), *self._of_detections())
+        return (*self._of_marks(), *self._of_detections(), *self._of_ground())
+
+    def _of_ground(self) -> tuple[str, ...]:
+        """What the user should know of the ground that was to be estimated."""
+        if self.estimate is None or not self.estimate.verdict:
+            return ()
+        return (f"the ground plane is not known ({self.estimate.verdict}); give --calibration FILE",)
 
     def _of_marks(self) -> tuple[str, ...]:
         """What the user should know about his marks."""
@@ -104,7 +152,8 @@ class Plan:
     def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
         """Yield every step of the run, the finishing one last."""
         given = self.source if frames is None else frames
-        return fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
+        steps = fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
+        return steps if self.scene.ground is None else _placed(steps, self.scene.ground)
 
     def _whole(self) -> Any:
         """The detector, with the marks beside it."""
@@ -129,6 +178,8 @@ def plan(
     end: str | float | None = None,
     stride: int = 1,
     roi: str | None = None,
+    calibration: str | Path | None = None,
+    object_height: float | None = None,
     zones: str | Path | Zones | None = None,
     classes: str | Collection[str] | None = (),
     parameters: Mapping[str, object] | None = None,
@@ -156,6 +207,11 @@ def plan(
         Take every n-th frame.
     roi : str or None
         Where things may be seen: an image, a polygon, a box or a file of polygons.
+    calibration : str, Path or None
+        A calibration file of the ground plane: places are then told in metres. 'auto': estimated, in a first look
+        over the source, from people who walk on it.
+    object_height : float or None
+        With 'auto': metres that they are high on the mean; None for 1.7.
     zones : str, Path, Zones or None
         Entries, exits, occluders and other zones of the place, and rules between them: a file of GeoJSON.
     classes : str or collection of str
@@ -183,6 +239,10 @@ def plan(
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
+        body = _body(opened, calibration, object_height)
+        if calibration is not None and not body:
+            ground = read_calibration(calibration, opened.width, opened.height)
+            scene = dataclasses.replace(scene, ground=ground)
         if zones is not None:
             scene = zoned(scene, zones)
         marks: tuple[Mark, ...] = ()
@@ -194,12 +254,42 @@ def plan(
         if marks and follows_marks(made_tracker):
             made_tracker = dataclasses.replace(made_tracker, reserved=max(mark.id for mark in marks))
         wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
-        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words, marks)
+        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words, marks, body)
         made.check()
     except BaseException:
         opened.close()
         raise
     return made
+
+
+def _body(source: Source, calibration: str | Path | None, object_height: float | None) -> float:
+    """The height of people by which the ground is to be estimated; 0 where it is not."""
+    if str(calibration) != AUTO:
+        if object_height is not None:
+            raise ParameterError("--object-height goes with --calibration auto; leave it out")
+        return 0.0
+    if not source.rereadable:
+        raise ParameterError(
+            f"{source.name} passes only once, without a first look; `perdure calibrate RUN` makes a calibration of a run"
+        )
+    return check_body(object_height)
+
+
+def check_body(height: float | None) -> float:
+    """Return the height of people in metres, 1.7 if none is given; refuse what nobody is."""
+    if height is None:
+        return BODY
+    if not (isinstance(height, (int, float)) and 0.05 <= height <= 20.0):
+        raise ParameterError(f"object_height = {height!r} is out of range: it must be 0.05 to 20 m")
+    return float(height)
+
+
+def _placed(steps: Iterable[fold.Step], ground: Ground) -> Iterator[fold.Step]:
+    """The steps, their rows with places and speeds on the ground."""
+    paths = Paths.none()
+    for step in steps:
+        paths, rows = placed(ground, paths, step.report.rows)
+        yield step._replace(report=dataclasses.replace(step.report, rows=rows))
 
 
 def track(source: AnySource, **options: Any) -> Tracks:
@@ -213,8 +303,8 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, zones, classes; and parameters of the
-        detector and the tracker by name.
+        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, zones, calibration, object_height,
+        classes; and parameters of the detector and the tracker by name.
 
     Raises
     ------
@@ -342,7 +432,21 @@ def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 _OPTIONS = frozenset(
-    ("tracker", "detector", "init", "fps", "start", "end", "stride", "roi", "zones", "classes", "parameters")
+    (
+        "tracker",
+        "detector",
+        "init",
+        "fps",
+        "start",
+        "end",
+        "stride",
+        "roi",
+        "zones",
+        "calibration",
+        "object_height",
+        "classes",
+        "parameters",
+    )
 )
 
 

@@ -31,7 +31,7 @@ from perdure.files.mots import write_masks
 from perdure.files.runs import Reporting, RunFolder
 from perdure.files.whole import refuse_existing, whole_file
 from perdure.fold import Corrections, settle_with
-from perdure.types import Status, Tracks
+from perdure.types import Ground, Status, Tracks
 
 CSV_COLUMNS = (
     "frame",
@@ -50,6 +50,7 @@ CSV_COLUMNS = (
     "visibility",
     "contour",
 )
+GROUND_COLUMNS = ("ground_x", "ground_y", "ground_speed")  # m, m/s; of a run whose ground plane is known
 FORMATS = ("csv", "mot", "mots", "mask-png", "geojson", "contour-csv", "svg")
 FOLDERS = {"mask-png": mask_pngs.SUFFIX, "svg": ".svg"}  # of one file a frame, with this suffix
 OF_BOXES = ("csv", "mot")
@@ -257,14 +258,15 @@ def _write_points(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], be
 
 def _write_csv(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
     table, count = csv.writer(file, lineterminator="\n"), 0
-    table.writerow(CSV_COLUMNS)
+    on_ground = bool(folder.read_about().get("ground"))
+    table.writerow((*CSV_COLUMNS, *(GROUND_COLUMNS if on_ground else ())))
     for rows in frames:
-        table.writerows(_csv_lines(rows))
+        table.writerows(_csv_lines(rows, on_ground))
         count += len(rows)
     return count
 
 
-def _csv_lines(rows: Tracks) -> Iterator[list[object]]:
+def _csv_lines(rows: Tracks, on_ground: bool) -> Iterator[list[object]]:
     visibility = rows.visibility
     for i in range(len(rows)):
         yield [
@@ -280,7 +282,14 @@ def _csv_lines(rows: Tracks) -> Iterator[list[object]]:
             rows.hidden_side[i],
             f"{visibility[i]:.4g}",
             wkt_of(rows.outlines[i]),
+            *(_ground_cells(rows.ground[i]) if on_ground else ()),
         ]
+
+
+def _ground_cells(place: Ground | None) -> tuple[object, ...]:
+    """X, Y and speed; empty where not known."""
+    x, y, speed = (None, None, None) if place is None else place
+    return tuple("" if one is None else f"{one:.3f}" for one in (x, y, speed))
 
 
 _LONGEST_SIDE = 1 << 16  # px

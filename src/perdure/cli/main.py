@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from perdure import __version__
+from perdure.cli.calibrate import calibrate
 from perdure.cli.demo import demo
 from perdure.cli.detect import detect
 from perdure.cli.draw import draw
@@ -45,7 +46,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, detect, draw, export, demo, warmup):
+for command in (track, detect, draw, export, calibrate, demo, warmup):
     app.command()(_interruptible(command))
 app.command(cls=ScoreCommand)(_interruptible(score))
 

@@ -52,6 +52,25 @@ RoiOption = Annotated[
         show_default=False,
     ),
 ]
+CalibrationOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--calibration",
+        metavar="FILE|auto",
+        help="Where the ground plane lies, a JSON file: places are told in metres, speeds in m/s. "
+        "'auto' estimates it from people who walk about, in a first look over the source.",
+        show_default=False,
+    ),
+]
+ObjectHeightOption = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(
+        "--object-height",
+        metavar="M",
+        help="How high in metres are those from whom the ground is estimated, on the mean (default 1.7).",
+        show_default=False,
+    ),
+]
 ZonesOption = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(

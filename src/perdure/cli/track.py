@@ -21,6 +21,7 @@ from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
 from perdure.errors import OutputError
+from perdure.files.calibration import value_of
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
 from perdure.files.shapes import is_file
@@ -54,6 +55,8 @@ def track(
     detector: options.DetectorOption = None,
     init: options.InitOption = None,
     roi: options.RoiOption = None,
+    calibration: options.CalibrationOption = None,
+    object_height: options.ObjectHeightOption = None,
     zones: options.ZonesOption = None,
     class_: options.ClassOption = None,
     fps: options.FpsOption = None,
@@ -80,16 +83,24 @@ def track(
         end=end,
         stride=stride,
         roi=roi,
+        calibration=calibration,
+        object_height=object_height,
         zones=zones,
         classes=class_ or (),
         parameters=given,
     )
     place = output or Path("perdure-runs") / made.source.name
-    inputs = [Path(one) for one in (source, detector, roi, zones, parameters) if one is not None and is_file(one)]
+    inputs = [
+        Path(one)
+        for one in (source, detector, roi, zones, calibration, parameters)
+        if one is not None and is_file(one)
+    ]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
     window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
     if zones is not None:
         window["zones"] = str(zones)
+    if calibration is not None:
+        window |= {"calibration": calibration, "object_height": object_height}
     outcome = run(made, folder, reporting, window=window, film=not no_video)
     show(outcome, folder, as_json=json_)
     if outcome.code:
@@ -154,7 +165,9 @@ def _run(
     live_film = film and not made.source.rereadable
     with RunLog(folder.log) as log:
         frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
-        steps: Iterable[Step] = ending.first_look(made).steps(frames)
+        made = ending.first_look(made)
+        about |= _ground(made)
+        steps: Iterable[Step] = made.steps(frames)
         if live_film:
             steps = drawn_while_running(steps, made.scene, folder.film)
         for step in steps:
@@ -240,5 +253,14 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
         "reporting": params.values(reporting),
+        **_ground(made),
         **({"zones": zones_to_json(Zones.of(made.scene))} if made.scene.zones else {}),
     }
+
+
+def _ground(made: Plan) -> dict[str, Any]:
+    """What is known of the ground plane, and the estimate as a calibration file has it; nothing where nothing is."""
+    ground, told = made.scene.ground, made.estimate
+    if ground is None:
+        return {}
+    return {"ground": {**ground.about(), **({} if told is None else {"calibration": value_of(told, ground.size)})}}

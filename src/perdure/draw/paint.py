@@ -131,6 +131,9 @@ def _looks(rows: Tracks, style: Style) -> list[_Look]:
         text = _group_text(identity, rows.ids[rows.groups == identity].tolist()) if is_group[i] else str(identity)
         if status == Status.AMBIGUOUS and not is_group[i]:
             text += "?"
+        place = rows.ground[i]
+        if place is not None and place.speed is not None and not is_group[i]:
+            text += f" {place.speed:.1f} m/s"
         dim = status in (Status.OCCLUDED, Status.LOST)
         dashes = _dashes(status, str(rows.hidden_side[i]), style)
         looks.append(_Look(dimmer(colour) if dim else colour, text, dashes, not dim, bool(is_group[i])))

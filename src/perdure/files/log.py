@@ -121,7 +121,7 @@ def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:
         "inferred": bool(rows.inferred[i]),
         "hidden_side": str(rows.hidden_side[i]),
         "links": list(rows.links[i]),
-        "ground": None if ground is None else list(ground),
+        "ground": None if ground is None else [one for one in ground if one is not None],
         "believed": None if believed is None else mask_to_json(believed),
         "outline": None if outline is None else outline_to_json(outline),
         "mask": mask_to_json(rows.masks[i]) if rows.masks[i].bits.size else None,

@@ -17,6 +17,8 @@ from perdure.features.boxes import centres, overlaps
 from perdure.features.masks import disjoint, holding
 from perdure.maths.assign import assign
 from perdure.params import parameter
+from perdure.scene.ground import Ground
+from perdure.scene.reach import within_reach
 from perdure.scene.zones import FORBIDDEN, Zones, counting, renumbered
 from perdure.types import Boxes, Event, Frame, Mask, Regions, Report, Scene, Status, Tracks
 
@@ -38,6 +40,7 @@ class OverlapState:
     next_id: int
     time: float  # s, of the last frame
     scene_size: tuple[int, int]  # height, width
+    ground: Ground | None  # where it lies, if it is known and wanted
     zones: Zones
     evidence: NDArray[np.float64]  # (N,) s for which each must be seen where it came in
     entry: Index  # (N,) the entry by which it came in; -1 for none
@@ -57,6 +60,17 @@ class Overlap:
     )
     inertia: float = parameter(0.3, "time over which speed is averaged", unit="s", low=0.0, high=60.0)
 
+    on_ground: bool = parameter(
+        True, "whether distances and sizes are compared in metres where the ground plane is known"
+    )
+    wander: float = parameter(
+        1.0,
+        "how fast a target may stray on the ground from where it is expected, where the plane is known",
+        unit="m/s",
+        low=0.0,
+        high=100.0,
+    )
+
     needs_pixels = False
 
     def start(self, scene: Scene) -> OverlapState:
@@ -64,8 +78,9 @@ class Overlap:
         none, places = np.zeros(0), np.zeros((0, 4), np.float32)
         size = (scene.height, scene.width)
         ids, nowhere, zones = none.astype(np.int64), none.astype(np.intp), Zones.of(scene)
+        ground = scene.ground if self.on_ground else None
         return OverlapState(
-            ids, places, places[:, :2], none, none, none, (), 1, 0.0, size, zones, none, nowhere, nowhere
+            ids, places, places[:, :2], none, none, none, (), 1, 0.0, size, ground, zones, none, nowhere, nowhere
         )
 
     def step(self, state: OverlapState, frame: Frame, regions: Regions) -> tuple[OverlapState, Report]:
@@ -95,11 +110,25 @@ class Overlap:
         """Return what is left to say: nothing."""
         return Report.empty()
 
+    def _refused(
+        self, state: OverlapState, cost: NDArray[np.floating], frame: Frame, boxes: Boxes
+    ) -> NDArray[np.floating]:
+        """The cost (N, M) with pairs forbidden that are too far apart on the ground, or too unlike in height."""
+        if state.ground is None:
+            return cost
+        rows, columns = np.nonzero(np.isfinite(cost))
+        elapsed = frame.time - state.seen[rows]
+        expected = _expected(state, frame.time)[rows]
+        near = within_reach(state.ground, expected, elapsed, boxes[columns], self.wander)
+        cost[rows[~near], columns[~near]] = np.inf
+        return cost
+
     def _matched(self, state: OverlapState, frame: Frame, boxes: Boxes) -> tuple[Index, Index, list[Event]]:
         """Give regions (M, 4) to targets, by overlap, then by what occluders and rules let expect; those left over too."""
         zones, expected = state.zones, _expected(state, frame.time)
         overlap = overlaps(expected, boxes)  # (N, M)
         cost = np.where(overlap >= self.least_overlap / zones.reach(expected)[:, None], 1.0 - overlap, np.inf)
+        cost = self._refused(state, cost, frame, boxes)
         lost = np.flatnonzero((state.missed > 0) & (state.ids > 0))
         if not zones or not len(lost) or not len(boxes):
             pairs, _, unmatched = assign(cost)

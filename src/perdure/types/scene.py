@@ -22,8 +22,8 @@ class Scene:
         Nominal frames per second; times come with the frames.
     zones : tuple of Zone
         Polygons with a kind and a name (`perdure.scene.zones`).
-    ground : object or None
-        The ground plane.
+    ground : perdure.scene.ground.Ground or None
+        The ground plane, where it is known.
     roi : (H, W) bool array or None
         True where something may be seen; None for everywhere.
     rules : tuple of Rule

@@ -36,11 +36,11 @@ class Status(enum.IntEnum):
 
 
 class Ground(NamedTuple):
-    """A place on the ground plane in metres and the speed there in metres per second."""
+    """A place on the ground plane in metres and the speed there in metres per second; None where not known yet."""
 
     x: float
     y: float
-    speed: float
+    speed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +226,7 @@ class Tracks:
         return self.take(~hidden & (self.status != Status.LOST) & ~self.is_group)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the plain columns as a pandas DataFrame (the extra `perdure[pandas]`)."""
+        """Return the plain columns as a pandas DataFrame (the extra `perdure[pandas]`); metres where any are known."""
         try:
             import pandas
         except ModuleNotFoundError:
@@ -238,8 +238,22 @@ class Tracks:
             for name in ("status", "confidence", "classes", "groups", "inferred", "hidden_side")
         }
         plain["status"] = [Status(value).word for value in self.status]
+        places = [tuple(one) if one else (None,) * 3 for one in self.ground] if any(self.ground) else []
+        metres = {
+            name: np.array([np.nan if place[i] is None else place[i] for place in places])
+            for i, name in enumerate(("ground_x", "ground_y", "ground_speed"))
+            if places
+        }
         return pandas.DataFrame(
-            {"frame": self.frames, "time": self.times, "id": self.ids, **boxes, **plain, "links": list(self.links)}
+            {
+                "frame": self.frames,
+                "time": self.times,
+                "id": self.ids,
+                **boxes,
+                **plain,
+                **metres,
+                "links": list(self.links),
+            }
         )
 
     def equals(self, other: Tracks) -> bool:

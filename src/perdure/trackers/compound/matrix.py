@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from perdure.types import Boxes
 
 Float = NDArray[np.float32]
 Index = NDArray[np.intp]
+Possible = Callable[[Index, Index], NDArray[np.bool_]]
 
 
 class Thresholds(NamedTuple):
@@ -93,6 +95,7 @@ def match(
     whole: NDArray[np.bool_],
     cost: Float,
     limits: Thresholds,
+    possible: Possible | None = None,
     place: Place | None = None,
 ) -> Matched:
     """Find visible, ambiguous and lost targets.
@@ -111,6 +114,8 @@ def match(
         Added to the distance of targets that should come second.
     limits : Thresholds
         What makes a correspondence.
+    possible : function or None
+        Of rows of regions (K,) and of targets (K,): which pairs may correspond, for all that is known of the place.
     place : Place or None
         What zones change.
     """
@@ -119,6 +124,8 @@ def match(
     farthest = limits.distance if place is None else limits.distance * float(place.reach.max(initial=1.0))
     entries = near(regions, targets, farthest, limits.size_ratio)
     allowed = entries.alike | whole[entries.target]
+    if possible is not None:
+        allowed &= whole[entries.target] | possible(entries.region, entries.target)
     if place is not None:
         allowed &= entries.distance < limits.distance * place.reach[entries.target]
         allowed &= ~place.forbidden[entries.target, entries.region]

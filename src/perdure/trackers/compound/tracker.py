@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from perdure.features.appearance import look, signature
 from perdure.params import parameter
+from perdure.scene.ground import Ground
+from perdure.scene.reach import within_reach
 from perdure.scene.zones import Zones, counting, renumbered
 from perdure.trackers.compound.bodies import Bodies
 from perdure.trackers.compound.companies import Pair, accompany
@@ -17,7 +19,7 @@ from perdure.trackers.compound.gathering import HIDDEN, Held, Sight, gather
 from perdure.trackers.compound.identity import Judge
 from perdure.trackers.compound.jitter import Jitter
 from perdure.trackers.compound.jitter import learnt as surprised
-from perdure.trackers.compound.matrix import Thresholds, match
+from perdure.trackers.compound.matrix import Possible, Thresholds, match
 from perdure.trackers.compound.meetings import Compound as Record
 from perdure.trackers.compound.meetings import form, resolve
 from perdure.trackers.compound.mending import Mended, mend, remember
@@ -49,6 +51,7 @@ class CompoundState:
     next_id: int
     time: float  # s, of the last frame
     size: tuple[int, int]  # height, width of the picture
+    ground: Ground | None  # where it lies, if it is known and wanted
     zones: Zones
 
 
@@ -103,6 +106,17 @@ class Compound:
         0.75, "similarity of colours from which a lost target is found again", low=0.0, high=1.0
     )
 
+    on_ground: bool = parameter(
+        True, "whether distances and sizes are compared in metres where the ground plane is known"
+    )
+    wander: float = parameter(
+        1.0,
+        "how fast a target may stray on the ground from where it is expected, where the plane is known",
+        unit="m/s",
+        low=0.0,
+        high=100.0,
+    )
+
     needs_pixels = False
 
     def start(self, scene: Scene) -> CompoundState:
@@ -122,6 +136,7 @@ class Compound:
             1,
             0.0,
             (scene.height, scene.width),
+            scene.ground if self.on_ground else None,
             Zones.of(scene),
         )
 
@@ -199,6 +214,7 @@ class Compound:
             said.next_id,
             time,
             state.size,
+            state.ground,
             zones,
         )
         rows = Tracks.join([mended.rows, said.rows])
@@ -243,12 +259,31 @@ class Compound:
             targets.temporary[active],
             cost[active].astype(np.float32),
             limits,
+            None if blobs else self._possible(state, expected, active, frame, regions),
             place_of(state.zones, targets, active, expected, frame, regions),
         )
         fresh = (targets.ids == 0) & (frame.time - targets.born < self.confirm)
         near = self.apart if blobs else -1.0
         sight = Sight(frame, regions, state.size, state.bodies, near, self.colour > 0)
         return gather(targets, expected, active, found, fresh, sight)
+
+    def _possible(
+        self, state: CompoundState, expected: Boxes, active: NDArray[np.intp], frame: Frame, regions: Regions
+    ) -> Possible | None:
+        """Which boxes may be which active targets for where they stand; None where the ground is not known.
+
+        Not asked of silhouettes: one may hold several, or a piece, and stand where none of them stands.
+        """
+        ground = state.ground
+        if ground is None:
+            return None
+
+        def possible(region: NDArray[np.intp], target: NDArray[np.intp]) -> NDArray[np.bool_]:
+            rows = active[target]
+            elapsed = frame.time - state.targets.seen[rows]
+            return within_reach(ground, expected[rows], elapsed, regions.boxes[region], self.wander)
+
+        return possible
 
     def _recalled(
         self,
