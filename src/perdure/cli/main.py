@@ -12,6 +12,7 @@ import typer
 
 from perdure import __version__
 from perdure.cli.calibrate import calibrate
+from perdure.cli.count import count
 from perdure.cli.demo import demo
 from perdure.cli.detect import detect
 from perdure.cli.draw import draw
@@ -46,7 +47,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, detect, draw, export, calibrate, demo, warmup):
+for command in (track, detect, draw, export, count, calibrate, demo, warmup):
     app.command()(_interruptible(command))
 app.command(cls=ScoreCommand)(_interruptible(score))
 
