@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from pathlib import Path
 
 import cv2
@@ -118,3 +119,10 @@ def test_a_file_of_zones_is_counted_whole_if_none_is_named(run: Path):
     printed, mistake = count(run, "--zones", str(run.parent / "zones.json"))
     assert not mistake
     assert "west door" in printed
+
+
+def test_a_run_without_tracks_is_refused(run: Path, tmp_path: Path):
+    shutil.copytree(run, tmp_path / "empty")
+    log = (run / "tracks.jsonl").read_text().splitlines()
+    (tmp_path / "empty" / "tracks.jsonl").write_text("\n".join(log[:3]) + "\n")
+    assert "has no rows that count; look at its film" in count(tmp_path / "empty", "--line", DOOR)[1]
