@@ -171,6 +171,14 @@ def test_speeds_are_metres_a_second_where_the_ground_is_known():
     assert counts.visits[0].ground_speed == 2
 
 
+def test_a_target_is_counted_with_the_class_that_most_of_its_rows_have():
+    car = track([40, 50, 70, 80]).replace(classes=["car", "bus", "car", "car"])
+    counts = count(Tracks.join([car, track([40, 80], identity=2)]), lines=[DOOR], zones=[ROOM], away=5)
+    assert [one.label for one in counts.of_classes(["car"]).crossings] == ["car"]
+    assert [one.id for one in counts.of_classes(["car"]).visits] == [1]
+    assert counts.of_classes(["bus"]).crossings == ()
+
+
 def test_nobody_is_counted_where_nobody_is():
     counts = count(Tracks.empty(), lines=[DOOR], zones=[ROOM], away=5)
     assert (counts.crossings, counts.visits) == ((), ())

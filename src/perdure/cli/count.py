@@ -81,7 +81,12 @@ def count(
             show_default=False,
         ),
     ] = None,
-    class_: options.ClassOption = None,
+    class_: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--class", metavar="NAME", help="Only targets of this class; may be repeated.", show_default=False
+        ),
+    ] = None,
     overwrite: options.OverwriteOption = False,
     json_: options.JsonOption = False,
 ) -> None:
@@ -102,8 +107,9 @@ def count(
     rows, frames, times = run_rows(folder, reporting.report_confidence)
     if not len(rows):
         raise FormatError(f"{run} has no rows that count; look at its film, and track again with other parameters")
+    _check_classes(rows, class_ or ())
     counts = count_rows(
-        _of_classes(rows, class_ or ()),
+        rows,
         lines=lines,
         zones=places,
         size=size,
@@ -112,6 +118,7 @@ def count(
         frames=frames,
         times=times,
     )
+    counts = counts.of_classes(class_) if class_ else counts
     on_ground = bool(about.get("ground"))
     told = {
         "run": str(run),
@@ -207,12 +214,11 @@ def _shown(speed: float | None) -> str:
     return "-" if speed is None else f"{speed:.1f}"
 
 
-def _of_classes(rows: Tracks, classes: Sequence[str]) -> Tracks:
+def _check_classes(rows: Tracks, classes: Sequence[str]) -> None:
     known = sorted({str(one) for one in np.unique(rows.classes)} - {""})
     for name in classes:
         if name not in known:
             raise ParameterError(f"--class: {params.unknown_name('class of this run', name, known)}")
-    return rows.take(np.isin(rows.classes, list(classes))) if classes else rows
 
 
 def _size(about: dict[str, Any], folder: RunFolder) -> tuple[int, int]:

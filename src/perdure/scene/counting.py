@@ -16,6 +16,7 @@ last one; somebody was in a zone if he got so deep into it, and he left it if he
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -114,6 +115,14 @@ class Counts:
     def of_zone(self, name: str) -> list[Visit]:
         """Return the visits of a zone."""
         return [one for one in self.visits if one.zone == name]
+
+    def of_classes(self, labels: Sequence[str]) -> Counts:
+        """Return what was counted of targets of these classes; a target's is the one that most of its rows have."""
+        return dataclasses.replace(
+            self,
+            crossings=tuple(one for one in self.crossings if one.label in labels),
+            visits=tuple(one for one in self.visits if one.label in labels),
+        )
 
     @cached_property
     def occupancy(self) -> dict[str, NDArray[np.int64]]:
