@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from worlds import Block, World, walk
 
 from perdure.errors import ParameterError
@@ -100,6 +102,25 @@ def test_who_passes_a_corner_of_a_bent_line_crosses_once(height: float):
     bent = Line("bent", ((60, 80), (60, 40), (60, 40), (70, 20), (60, 0)))
     assert ways(track([40, 50, 75, 90], ys=height), bent) == ["in"]
     assert ways(track([90, 75, 50, 40], ys=height), bent) == ["out"]
+
+
+@given(
+    xs=st.lists(st.integers(0, 12), min_size=4, max_size=4),
+    path=st.lists(st.tuples(st.integers(0, 12), st.integers(1, 11)), min_size=2, max_size=8),
+)
+@settings(max_examples=150, deadline=None)
+def test_crossings_add_up_to_the_change_of_side_also_through_corners(xs: list[int], path: list[tuple[int, int]]):
+    bent = tuple((x, 12 - 4 * n) for n, x in enumerate(xs))  # upwards, over the whole height
+
+    def is_right(x: int, y: int) -> bool:
+        n = min((12 - y) // 4, 2)
+        (x1, y1), (x2, y2) = bent[n], bent[n + 1]
+        return (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1) >= 0
+
+    rows = Tracks.of(frames=range(len(path)), times=0.0, ids=1, boxes=[[x, y, x, y] for x, y in path])
+    rows = rows.replace(times=rows.frames / 10, ids=np.ones(len(path)))
+    said = ways(rows, Line("bent", bent), away=0)
+    assert said.count("in") - said.count("out") == is_right(*path[-1]) - is_right(*path[0])
 
 
 def test_who_stops_with_the_foot_exactly_on_the_line_crosses_once_or_not_at_all():

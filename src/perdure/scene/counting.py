@@ -290,24 +290,24 @@ def _places(tracks: Tracks, point: str, size: tuple[int, int] | None) -> Float:
 def _meetings(begin: Float, end: Float, edges: Float) -> list[tuple[float, int]]:
     """Where a step from one point to another meets edges (E, 4): its share in [0, 1], and +1 to their right, else -1.
 
-    The right of an edge belongs to it, and so does its first point, so that who passes a corner passes one edge of it.
+    Where a point is exactly on an edge, or a corner exactly on the step, all points of paths are thought to lie a trifle
+    farther to the right in the picture, and still less farther down; then who passes a corner passes one edge of it.
     """
-    first, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
-    before, after = _right(begin, first, along), _right(end, first, along)  # (E,), the y of pictures goes down
-    passed = np.flatnonzero((before >= 0) != (after >= 0))
-    found = []
-    for edge in passed:
-        share = before[edge] / (before[edge] - after[edge])
-        sides = _right(edges[edge].reshape(2, 2), begin, end - begin)
-        if (sides[0] >= 0) != (sides[1] >= 0):
-            found.append((float(share), 1 if after[edge] >= 0 else -1))
-    return sorted(found)
+    first, along, step = edges[:, :2], edges[:, 2:] - edges[:, :2], end - begin
+    before, after = _right(begin - first, along), _right(end - first, along)  # (E,) times the edges' lengths
+    tie = np.where(along[:, 1] != 0, -along[:, 1], along[:, 0])
+    beyond = np.where(after != 0, after, tie) > 0
+    passed = (np.where(before != 0, before, tie) > 0) != beyond
+    corners = _right(edges.reshape(-1, 2, 2) - begin, step)  # (E, 2)
+    sides = np.where(corners != 0, corners, step[1] if step[1] else -step[0]) > 0
+    met = np.flatnonzero(passed & (sides[:, 0] != sides[:, 1]))
+    shares = before[met] / (before[met] - after[met])
+    return sorted(zip(shares.tolist(), np.where(beyond[met], 1, -1).tolist(), strict=True))
 
 
-def _right(points: Float, first: Float, along: Float) -> Float:
-    """How far to the right of a direction points lie, times its length; y goes down."""
-    offset = points - first
-    return np.asarray(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0])
+def _right(offsets: Float, along: Float) -> Float:
+    """How far to the right of a direction offsets (..., 2) reach, times its length; y goes down."""
+    return np.asarray(along[..., 0] * offsets[..., 1] - along[..., 1] * offsets[..., 0])
 
 
 # Lines ------------------------------------------------------------------------------------------------------
