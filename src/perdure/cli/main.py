@@ -17,6 +17,7 @@ from perdure.cli.demo import demo
 from perdure.cli.detect import detect
 from perdure.cli.draw import draw
 from perdure.cli.export import export
+from perdure.cli.learn_zones import learn
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
 from perdure.cli.warmup import warmup
@@ -49,6 +50,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
 
 for command in (track, detect, draw, export, count, calibrate, demo, warmup):
     app.command()(_interruptible(command))
+app.command("learn-zones")(_interruptible(learn))
 app.command(cls=ScoreCommand)(_interruptible(score))
 
 

@@ -70,10 +70,17 @@ def read_zones(path: str | Path, width: int = 0, height: int = 0) -> Zones:
         raise FormatError(f"{path}: {error}") from None
 
 
-def write_zones(path: Path, zones: Zones) -> None:
-    """Write zones and rules into a file that `read_zones` reads; it appears whole or not at all."""
+def write_zones(path: Path, zones: Zones, reasons: Mapping[str, str] | None = None) -> None:
+    """Write zones and rules into a file that `read_zones` reads; it appears whole or not at all.
+
+    `reasons` tell by name why there is a zone; readers leave them alone.
+    """
+    collection = zones_to_json(zones)
+    for feature in collection["features"]:
+        if reasons and feature["properties"]["name"] in reasons:
+            feature["properties"]["reason"] = reasons[feature["properties"]["name"]]
     with whole_file(path) as file:
-        json.dump(zones_to_json(zones), file, indent=1, ensure_ascii=False)
+        json.dump(collection, file, indent=1, ensure_ascii=False)
         file.write("\n")
 
 
