@@ -93,6 +93,7 @@ def test_a_film_that_is_gone_is_a_note_and_the_picture_is_dark(tmp_path: Path, r
         (["run", "-o", "zones.txt"], "must end in .json"),
         (["run", "-o", "zones.json", "--draw", "zones.jpg"], "must end in .png"),
         (["run", "-o", "run/run.json", "--overwrite"], "part of the run itself"),
+        (["run", "-o", "fresh.json", "--draw", "film/000.png", "--overwrite"], "picture of the film itself"),
         (["run", "-o", "there.json/zones.json"], "cannot write"),
         (["run", "-o", "fresh.json", "--source", "small"], "the run was over 120x80"),
     ],

@@ -61,6 +61,7 @@ def learn(
     """Propose entries, exits, occluders and noise from the tracks of RUN, for you to look at and edit."""
     picture = _checked(run, output, draw, overwrite=overwrite)
     folder = RunFolder.open(run)
+    _refuse_to_replace_the_film(picture, folder, source)
     size = _size(folder)
     looks = _looks(folder, size, source)
     learnt = learnt_from(folder.settled_by_frame(), _times(folder), size, [one.image for one in looks])
@@ -132,6 +133,18 @@ def _checked(run: Path, output: Path, draw: Path | None, *, overwrite: bool) -> 
         what = "is a folder" if picture.is_dir() else "is there already; add --overwrite or"
         raise OutputError(f"{picture} {what}{';' if picture.is_dir() else ''} name another file with --draw")
     return picture
+
+
+def _refuse_to_replace_the_film(picture: Path, folder: RunFolder, source: str | None) -> None:
+    """Refuse a picture that is there among the film's own."""
+    place = folder.read_about().get("source") if source is None else source
+    film = Path(place).resolve() if isinstance(place, str) else None
+    mine = picture.resolve()
+    among = film is not None and (
+        mine == film or film in mine.parents or ("*" in film.name and mine.parent == film.parent)
+    )
+    if among and picture.exists():
+        raise OutputError(f"{picture} may be a picture of the film itself; name another file with --draw")
 
 
 def _size(folder: RunFolder) -> tuple[int, int]:
