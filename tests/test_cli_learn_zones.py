@@ -115,7 +115,7 @@ def test_a_run_that_tells_nothing_says_why(tmp_path: Path):
     run = written(tmp_path, World(PEOPLE[:1], count=80))
     code, _, wrong = learn(run, "-o", tmp_path / "zones.json")
     assert code != 0
-    assert "tells of no zone (entry: tracks that went anywhere: 1, needed are 3" in wrong
+    assert "tells of no zone (entry, exit, occlusion: tracks that went anywhere: 1, needed are 3" in wrong
     assert "track a longer film, or draw the zones yourself" in wrong
     assert not (tmp_path / "zones.json").exists()
 

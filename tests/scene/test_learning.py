@@ -73,6 +73,17 @@ def test_who_comes_out_from_behind_a_post_under_another_id_neither_left_nor_came
     assert told(found)[2:] == [("occlusion", "occluder", 4)]
 
 
+def test_an_occluder_is_wide_enough_to_hide_somebody():
+    """The detector loses them in the middle, and its boxes before and after touch: nothing lies between."""
+    world = from_left_to_right()
+    rows = world.truth()
+    found = learnt(rows.take((rows.boxes[:, 0] <= 50) | (rows.boxes[:, 0] >= 60)), (0.0, 29.9))
+    assert told(found)[2:] == [("occlusion", "occluder", 4)]
+    x1, _, x2, _ = bounds(found, "occluder")
+    assert (x1 + x2) / 2 == pytest.approx(60, abs=1)
+    assert x2 - x1 >= 3
+
+
 def test_who_is_hidden_by_another_shows_no_post():
     rows = behind_a_post().truth()
     friends = [

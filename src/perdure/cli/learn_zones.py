@@ -66,7 +66,9 @@ def learn(
     looks = _looks(folder, size, source)
     learnt = learnt_from(folder.settled_by_frame(), _times(folder), size, [one.image for one in looks])
     if not learnt.proposals:
-        why = "; ".join(f"{kind}: {reason}" for kind, reason in learnt.missing.items())
+        reasons = dict.fromkeys(learnt.missing.values())
+        kinds = {why: ", ".join(kind for kind, one in learnt.missing.items() if one == why) for why in reasons}
+        why = "; ".join(f"{kinds[reason]}: {reason}" for reason in reasons)
         raise PerdureError(f"{run} tells of no zone ({why}); track a longer film, or draw the zones yourself")
     zones = Zones(tuple(one.zone for one in learnt.proposals), (), size)
     told = {one.zone.name: one.reason for one in learnt.proposals}

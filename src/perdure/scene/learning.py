@@ -453,8 +453,10 @@ def _occluders(
         people = len(np.unique(lost.ids[members]))
         most = max(most, people)
         if people >= _LEAST:
-            x1, y1, x2, y2 = np.median(places[members], axis=0)
+            x1, _, x2, _ = np.median(places[members], axis=0)
             y1, y2 = places[members, 1].min(), places[members, 3].max()
+            thin = max(0.0, _HIDES * float(np.median(lost.side[members])) - (x2 - x1)) / 2
+            x1, x2 = x1 - thin, x2 + thin
             place = _rectangle(x1, y1, x2, y2, size)
             why = f"{people} were lost and found again here"
             found.append(_proposal("occlusion", "occluder", place, people, why))
@@ -634,6 +636,7 @@ _SHALLOW, _DEEP = 0.04, 0.15  # of the picture, that a zone at the border reache
 _CORNER = 0.05  # of the picture's side: what is so near to a corner reaches it
 _PAUSE = 0.3  # s without being seen, from which somebody is lost
 _SOON = 3.0  # s after which a walk that broke goes on
+_HIDES = 0.3  # of their size, that what hides them is wide at least
 _LEAP = 3.0  # own sides, over which one who was lost is found again
 _IN_FRONT = 0.2  # share of a box under another's, from which that one hides it
 _SEAM = 2.0  # px by which a bridge overlaps what it joins
