@@ -1,11 +1,12 @@
-"""What zones bring: people of a film by every tracker, with the zones that a user drew and without, all else equal.
+"""What zones bring: people of a film by every tracker without zones, with those that a user drew, and with learnt ones.
 
     python bench/zones.py [--data DIR] [--trackers NAME ...] [--regions background detections] [--json] [--write]
 
 The film is pets09-s2l1, the zones are bench/zones/pets09-s2l1.json, drawn once by looking at one frame: an occluder
 round the lamp post with its sign, and an entry and an exit at each place where the picture's border crosses the road or
 the path. `background` is the whole chain from pixels, as `perdure track` runs it, `detections` the film with the boxes of
-det/det.txt. Counted is as `perdure score` counts: MOTA, IDF1 in percent at IoU 0.5, identity switches, fragments, and
+det/det.txt. `learnt` zones are those that `perdure learn-zones` proposes from the run without zones, as they are; all else
+is equal. Counted is as `perdure score` counts: MOTA, IDF1 in percent at IoU 0.5, identity switches, fragments, and
 ids said. The data is read from $PERDURE_DATA or ../shared/data beside the repository. --write puts the table into
 docs/zones.md, --json prints everything as one object in the last line.
 """
@@ -26,12 +27,16 @@ import numpy as np
 from regions import Table, chosen, markdown, plain
 
 from perdure import fold
+from perdure.cli.learn_zones import LOOKS, learnt_from
 from perdure.errors import PerdureError
 from perdure.files.mot import read_truth
+from perdure.files.video import open_source
 from perdure.files.whole import whole_file
 from perdure.metrics.scoring import score
 from perdure.pipeline import plan
+from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
+from perdure.types import Report
 
 ROOT = Path(__file__).resolve().parents[1]
 CLIP = "pets09-s2l1"
@@ -77,7 +82,7 @@ class Told:
 
     tracker: str
     regions: str
-    zones: bool
+    zones: str  # none, drawn or learnt
     figures: Mapping[str, float]
     ids: int
     rate: float  # frames a second, decoding and regions included
@@ -95,22 +100,41 @@ class Told:
 
 
 def measure(folder: Path, trackers: Sequence[str], kinds: Sequence[str]) -> list[Told]:
-    """Run every tracker on every kind of regions, without zones and with them."""
+    """Run every tracker on every kind of regions, without zones, with those that were drawn, and with learnt ones."""
     truth, told = read_truth(folder / "gt" / "gt.txt"), []
     for kind in kinds:
         for tracker in trackers:
-            for zones in (None, ZONES):
-                told.append(_run(folder, tracker, kind, zones, truth))
-                print(
-                    f"{tracker}, {kind}, zones {zones is not None}: {told[-1].rate:.0f} frames/s", file=sys.stderr
-                )
+            plain_one, reports = _run(folder, tracker, kind, "none", None, truth)
+            learnt = _learnt(folder, reports)
+            told.append(plain_one)
+            for name, zones in (("drawn", ZONES), ("learnt", learnt)):
+                told.append(_run(folder, tracker, kind, name, zones, truth)[0])
+            rates = ", ".join(f"{one.zones} {one.rate:.0f}" for one in told[-3:])
+            print(f"{tracker}, {kind}: {rates} frames/s", file=sys.stderr)
     return told
 
 
-def _run(folder: Path, tracker: str, kind: str, zones: Path | None, truth: Any) -> Told:
+def _learnt(folder: Path, reports: Sequence[Report]) -> Zones:
+    """The zones that are proposed from a run over the film, as they are."""
+    source = open_source(folder / "video.avi")
+    try:
+        looks, times = source.sample(LOOKS), [frame.time for frame in source]
+    finally:
+        source.close()
+    size = source.height, source.width
+    settled = fold.settle_by_frame(lambda: iter(reports))
+    found = learnt_from(settled, (times[0], times[-1]), size, [look.image for look in looks])
+    return Zones(tuple(one.zone for one in found.proposals), (), size)
+
+
+def _run(
+    folder: Path, tracker: str, kind: str, name: str, zones: Path | Zones | None, truth: Any
+) -> tuple[Told, list[Report]]:
+    """The figures of one run, and what it said."""
     detector = None if REGIONS[kind] is None else folder / str(REGIONS[kind])
     made = plan(str(folder / "video.avi"), tracker=tracker, detector=detector, zones=zones)
-    begun, reports = time.monotonic(), []
+    begun = time.monotonic()
+    reports: list[Report] = []
     try:
         for step in made.prepared().steps():
             reports.append(step.report)
@@ -119,9 +143,8 @@ def _run(folder: Path, tracker: str, kind: str, zones: Path | None, truth: Any) 
     seconds = time.monotonic() - begun
     tracks = fold.settle(reports).counted()
     figures = score(tracks, truth).figures
-    return Told(
-        tracker, kind, zones is not None, figures, len(np.unique(tracks.ids)), (len(reports) - 1) / seconds
-    )
+    rate = (len(reports) - 1) / seconds
+    return Told(tracker, kind, name, figures, len(np.unique(tracks.ids)), rate), reports
 
 
 def table(told: Sequence[Told]) -> Table:
@@ -130,7 +153,7 @@ def table(told: Sequence[Told]) -> Table:
         [
             one.tracker,
             one.regions,
-            "drawn" if one.zones else "none",
+            one.zones,
             *(f"{100 * one.figures[name]:.1f}" for name in FIGURES[:2]),
             *(f"{one.figures[name]:.0f}" for name in FIGURES[2:]),
             str(one.ids),
