@@ -184,7 +184,9 @@ class Contour:
         place = Place(lab, nothing, nothing, grey, step)
         if state.place.grey.shape == grey.shape:
             place, camera = moved_on(state.place, grey, step, self._things(state.targets, state.size))
-            if not np.array_equal(camera, np.eye(2, 3)):  # outlines change with what is behind: no gait is told from it
+            if not np.array_equal(
+                camera, np.eye(2, 3)
+            ):  # outlines change with what is behind: no gait is told from it
                 state = replace(state, targets=tuple(replace(one, restless=0.0) for one in state.targets))
         light = np.asarray(cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY), np.uint8)
         sights = [self._look(*self._moved(one, state.light, light), lab, place) for one in state.targets]
