@@ -25,22 +25,20 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import itertools
 import json
 import os
-import platform
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
 import cv2
 import numpy as np
+from pages import Marks, versions
 from regions import Table, chosen, markdown, plain
 
 from perdure.errors import ParameterError, PerdureError
@@ -54,7 +52,7 @@ from perdure.types import Bits, Frame, Mask, Regions, Scene
 PARTS = ("updates", "length", "area", "stages")
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "contour-observer.md"
-BEGIN, END = "<!-- bench/contour.py begins -->", "<!-- bench/contour.py ends -->"
+MARKS = Marks.of("bench/contour.py", PAGE)
 WINDOW, STEPS, REACH, RING = 5, 10, 8, 40
 FRAMES, WARM = 26, 6  # of a walk; frames of it that do not count
 SIZES = ((50, 100), (100, 200), (150, 300), (200, 400))  # of objects, width and height
@@ -71,7 +69,7 @@ def main() -> None:
         if arguments.write:
             text = PAGE.read_text(encoding="utf-8")
             with whole_file(PAGE) as file:
-                file.write(replaced(text, section("python bench/contour.py --write", result, text)))
+                file.write(MARKS.replaced(text, section("python bench/contour.py --write", result, text)))
         if arguments.json:
             print(json.dumps(result.told))
     except PerdureError as error:
@@ -123,10 +121,6 @@ def measure(parts: Sequence[str], rounds: int, data: Path) -> Result:
         tables += [stages_table(steps)] if steps else []
         told["stages"] = [one.as_json() for one in steps]
     return Result(tuple(tables), told)
-
-
-def versions() -> dict[str, str]:
-    return {"python": platform.python_version(), "perdure": metadata.version("perdure"), "cv2": cv2.__version__}
 
 
 def exponent(sizes: Sequence[float], times: Sequence[float]) -> float:
@@ -417,32 +411,11 @@ def stages_table(steps: Sequence[Steps]) -> Table:
 
 def section(command: str, result: Result, page: str = "") -> str:
     """Return what stands between the marks in docs/contour-observer.md; tables of parts that were not run stay."""
-    written = tables_on(page)
-    for part in PARTS:
-        if part in result.told:
-            written[part] = [markdown(one) for one in result.tables if one.title.startswith(f"{part}:")]
+    kept = [(title, table) for title, table in MARKS.tables(page) if title.partition(":")[0] not in result.told]
+    written = [*kept, *((one.title, markdown(one)) for one in result.tables)]
     told = ", ".join(f"{name} {version}" for name, version in result.told["versions"].items())
-    tables = [table for part in PARTS for table in written.get(part, ())]
+    tables = [table for part in PARTS for title, table in written if title.startswith(f"{part}:")]
     return "\n\n".join([f"`{command}`", *tables, f"Versions: {told}."])
-
-
-def tables_on(page: str) -> dict[str, list[str]]:
-    """Return the tables that a page has between our marks, by part."""
-    found: dict[str, list[str]] = {}
-    blocks = page.partition(BEGIN)[2].partition(END)[0].strip().split("\n\n")
-    for title, table in itertools.pairwise(blocks):
-        if title.startswith("**"):
-            found.setdefault(title[2:].partition(":")[0], []).append(f"{title}\n\n{table}")
-    return found
-
-
-def replaced(page: str, inside: str) -> str:
-    """Return a page with what is between our marks replaced; ParameterError where the marks are not there."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ParameterError(f"{PAGE.name} must have the lines {BEGIN!r} and {END!r}, in this order")
-    return f"{before}{BEGIN}\n{inside}\n{END}{after}"
 
 
 if __name__ == "__main__":

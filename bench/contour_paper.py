@@ -32,17 +32,16 @@ import argparse
 import itertools
 import json
 import os
-import platform
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pages import Marks, absent, versions
 from regions import Table, chosen, markdown, plain
 
 from perdure import fold
@@ -62,7 +61,7 @@ PARTS = ("binary", "figures", "grid", "fall")
 CLIPS = ("attractive", "whiteband", "turning", "behind2")
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "contour-observer.md"
-BEGIN, END = "<!-- bench/contour_paper.py begins -->", "<!-- bench/contour_paper.py ends -->"
+MARKS = Marks.of("bench/contour_paper.py", PAGE)
 
 
 def main() -> None:
@@ -73,7 +72,7 @@ def main() -> None:
         if arguments.write:
             text = PAGE.read_text(encoding="utf-8")
             with whole_file(PAGE) as file:
-                file.write(replaced(text, section("python bench/contour_paper.py --write", result, text)))
+                file.write(MARKS.replaced(text, section("python bench/contour_paper.py --write", result, text)))
         if arguments.json:
             print(json.dumps(result.told))
     except PerdureError as error:
@@ -126,18 +125,6 @@ def measure(arguments: argparse.Namespace) -> Result:
     if "fall" in parts:
         told["fall"] = fall(arguments.data / "cdnet-fall", arguments.draw)
     return Result(tuple(tables), told)
-
-
-def versions() -> dict[str, str]:
-    return {"python": platform.python_version(), "perdure": metadata.version("perdure"), "cv2": cv2.__version__}
-
-
-def absent(path: Path) -> bool:
-    """Say on stderr that a clip is not there, if it is not."""
-    if path.exists():
-        return False
-    print(f"note: {path.parent.name}/{path.name} is not there; it is left out", file=sys.stderr)
-    return True
 
 
 # Binary sequences -------------------------------------------------------------------------------------------
@@ -709,26 +696,10 @@ def strip_tile(frame: Frame, rows: Tracks) -> Image:
 
 def section(command: str, result: Result, page: str = "") -> str:
     """Return what stands between the marks in docs/contour-observer.md; tables that were not made anew stay."""
-    written = tables_on(page) | {one.title: markdown(one) for one in result.tables}
+    written = dict(MARKS.tables(page)) | {one.title: markdown(one) for one in result.tables}
     told = ", ".join(f"{name} {version}" for name, version in result.told["versions"].items())
     tables = [table for part in PARTS for title, table in written.items() if title.startswith(f"{part}:")]
     return "\n\n".join([f"`{command}`", *tables, f"Versions: {told}."])
-
-
-def tables_on(page: str) -> dict[str, str]:
-    """Return the tables that a page has between our marks, by title."""
-    blocks = page.partition(BEGIN)[2].partition(END)[0].strip().split("\n\n")
-    pairs = itertools.pairwise(blocks)
-    return {title.strip("*"): f"{title}\n\n{table}" for title, table in pairs if title.startswith("**")}
-
-
-def replaced(page: str, inside: str) -> str:
-    """Return a page with what is between our marks replaced; ParameterError where the marks are not there."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ParameterError(f"{PAGE.name} must have the lines {BEGIN!r} and {END!r}, in this order")
-    return f"{before}{BEGIN}\n{inside}\n{END}{after}"
 
 
 if __name__ == "__main__":

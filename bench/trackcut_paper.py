@@ -40,17 +40,14 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
-import itertools
 import json
 import os
-import platform
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -58,6 +55,7 @@ from unittest import mock
 import cv2
 import numpy as np
 from cut_domain import Compared, compared, domain_table
+from pages import Marks, absent, versions
 from regions import Table, chosen, markdown, plain
 
 from perdure import fold
@@ -81,7 +79,7 @@ PARTS = ("davis", "composites", "pets", "domain", "speed")
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "track-and-cut.md"
 WARM = 5  # frames of a new start that are not timed
-BEGIN, END = "<!-- bench/trackcut_paper.py begins -->", "<!-- bench/trackcut_paper.py ends -->"
+MARKS = Marks.of("bench/trackcut_paper.py", PAGE)
 
 
 def main() -> None:
@@ -92,7 +90,7 @@ def main() -> None:
         if arguments.write:
             text = PAGE.read_text(encoding="utf-8")
             with whole_file(PAGE) as file:
-                file.write(replaced(text, section("python bench/trackcut_paper.py --write", result, text)))
+                file.write(MARKS.replaced(text, section("python bench/trackcut_paper.py --write", result, text)))
         if arguments.json:
             print(json.dumps(result.told))
     except PerdureError as error:
@@ -145,18 +143,6 @@ def measure(arguments: argparse.Namespace) -> Result:
         tables += [speed_table(speed)] if speed else []
         told["speed"] = speed and speed.as_json()
     return Result(tuple(tables), told)
-
-
-def versions() -> dict[str, str]:
-    return {"python": platform.python_version(), "perdure": metadata.version("perdure"), "cv2": cv2.__version__}
-
-
-def absent(path: Path) -> bool:
-    """Say on stderr that a clip is not there, if it is not."""
-    if path.exists():
-        return False
-    print(f"note: {path.parent.name}/{path.name} is not there; it is left out", file=sys.stderr)
-    return True
 
 
 # Masks from the first frame's -------------------------------------------------------------------------------
@@ -923,32 +909,11 @@ def _small(frame: Frame, said: Tracks) -> Image:
 
 def section(command: str, result: Result, page: str = "") -> str:
     """Return what stands between the marks in docs/track-and-cut.md; a page's tables of parts that were not run stay."""
-    written = tables_on(page)
-    for part in PARTS:
-        if part in result.told:
-            written[part] = [markdown(one) for one in result.tables if one.title.startswith(f"{part}:")]
+    kept = [(title, table) for title, table in MARKS.tables(page) if title.partition(":")[0] not in result.told]
+    written = [*kept, *((one.title, markdown(one)) for one in result.tables)]
     told = ", ".join(f"{name} {version}" for name, version in result.told["versions"].items())
-    tables = [table for part in PARTS for table in written.get(part, ())]
+    tables = [table for part in PARTS for title, table in written if title.startswith(f"{part}:")]
     return "\n\n".join([f"`{command}`", *tables, f"Versions: {told}."])
-
-
-def tables_on(page: str) -> dict[str, list[str]]:
-    """Return the tables that a page has between our marks, by part."""
-    found: dict[str, list[str]] = {}
-    blocks = page.partition(BEGIN)[2].partition(END)[0].strip().split("\n\n")
-    for title, table in itertools.pairwise(blocks):
-        if title.startswith("**"):
-            found.setdefault(title[2:].partition(":")[0], []).append(f"{title}\n\n{table}")
-    return found
-
-
-def replaced(page: str, inside: str) -> str:
-    """Return a page with what is between our marks replaced; ParameterError where the marks are not there."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ParameterError(f"{PAGE.name} must have the lines {BEGIN!r} and {END!r}, in this order")
-    return f"{before}{BEGIN}\n{inside}\n{END}{after}"
 
 
 if __name__ == "__main__":

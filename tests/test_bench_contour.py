@@ -59,12 +59,12 @@ def test_tables_of_other_parts_stay_on_the_page_and_its_marks_are_needed(tmp_pat
     with pytest.raises(ParameterError, match="rounds = 0"):
         bench.measure(["updates"], 0, tmp_path)
     with pytest.raises(ParameterError, match="must have the lines"):
-        bench.replaced("no marks", "inside")
+        bench.MARKS.replaced("no marks", "inside")
     table = bench.Table("updates: new", ["one"], [["new"]])
     result = bench.Result((table,), {"versions": {"cv2": "5"}, "updates": []})
-    page = f"{bench.BEGIN}\n**updates: old**\n\n| old |\n\n**area: old**\n\n| kept |\n{bench.END}\n"
+    page = f"{bench.MARKS.begin}\n**updates: old**\n\n| old |\n\n**area: old**\n\n| kept |\n{bench.MARKS.end}\n"
     inside = bench.section("run", result, page)
     assert "new" in inside
     assert "| kept |" in inside
     assert "| old |" not in inside
-    assert bench.replaced(page, inside).startswith(f"{bench.BEGIN}\n`run`")
+    assert bench.MARKS.replaced(page, inside).startswith(f"{bench.MARKS.begin}\n`run`")

@@ -195,15 +195,17 @@ def test_tables_of_parts_that_were_not_run_stay_on_the_page():
     versions = {"versions": {"python": "3"}}
     grid = Table("grid: g", ["gain", "mean"], [["L = 0.1", "0.5"]])
     binary = Table("binary: b", ["gain", "px"], [["0.1", "0.2"]])
-    page = f"before\n{bench.BEGIN}\nold\n{bench.END}\nafter\n"
-    page = bench.replaced(page, bench.section("run", bench.Result((grid,), {**versions, "grid": []}), page))
-    page = bench.replaced(page, bench.section("run", bench.Result((binary,), {**versions, "binary": []}), page))
+    page = f"before\n{bench.MARKS.begin}\nold\n{bench.MARKS.end}\nafter\n"
+    page = bench.MARKS.replaced(page, bench.section("run", bench.Result((grid,), {**versions, "grid": []}), page))
+    page = bench.MARKS.replaced(
+        page, bench.section("run", bench.Result((binary,), {**versions, "binary": []}), page)
+    )
     assert page.index("**binary: b**") < page.index("**grid: g**")
     assert page.startswith("before")
     assert page.endswith("after\n")
     assert "old" not in page
     with pytest.raises(ParameterError, match=r"contour-observer\.md must have the lines"):
-        bench.replaced("no marks", "x")
+        bench.MARKS.replaced("no marks", "x")
 
 
 def test_a_part_that_is_not_known_is_the_callers_mistake(monkeypatch, capsys):

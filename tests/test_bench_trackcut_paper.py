@@ -353,11 +353,11 @@ def test_too_few_objects_cannot_be_timed():
 
 
 def test_what_is_between_the_marks_is_replaced():
-    page = f"# Title\n\n{bench.BEGIN}\nold\n{bench.END}\n\nEnd.\n"
-    assert bench.replaced(page, "new") == page.replace("old", "new")
+    page = f"# Title\n\n{bench.MARKS.begin}\nold\n{bench.MARKS.end}\n\nEnd.\n"
+    assert bench.MARKS.replaced(page, "new") == page.replace("old", "new")
     with pytest.raises(ParameterError, match="must have the lines"):
-        bench.replaced("# Title\n", "new")
-    assert bench.BEGIN in bench.PAGE.read_text(encoding="utf-8")
+        bench.MARKS.replaced("# Title\n", "new")
+    assert bench.MARKS.begin in bench.PAGE.read_text(encoding="utf-8")
 
 
 def test_what_is_not_there_is_left_out_with_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -375,9 +375,9 @@ def test_tables_of_parts_that_were_not_run_stay():
         tables = tuple(Table(f"{part}: {cell}", ["one"], [[cell]]) for part, cell in parts.items())
         return bench.Result(tables, {"versions": {"python": "3"}, **parts})
 
-    both = f"{bench.BEGIN}\n{bench.section('run', result(davis='old', speed='old'))}\n{bench.END}\n"
-    page = bench.replaced(both, bench.section("run", result(speed="new", pets="new"), both))
-    assert [title for part in bench.tables_on(page).values() for title in part] == [
+    both = f"{bench.MARKS.begin}\n{bench.section('run', result(davis='old', speed='old'))}\n{bench.MARKS.end}\n"
+    page = bench.MARKS.replaced(both, bench.section("run", result(speed="new", pets="new"), both))
+    assert [table for _, table in bench.MARKS.tables(page)] == [
         "**davis: old**\n\n| one |\n| --- |\n| old |",
         "**pets: new**\n\n| one |\n| --- |\n| new |",
         "**speed: new**\n\n| one |\n| --- |\n| new |",
