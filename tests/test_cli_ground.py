@@ -106,6 +106,7 @@ def test_the_ground_is_estimated_in_a_first_look_and_noted(tmp_path, square):
     track(square, "-o", run, "--calibration", "auto", "--no-video")
     about = json.loads((run / "run.json").read_text())
     assert about["ground"]["origin"] == "video"
+    assert "the ground plane is estimated from" in about["warnings"][0]
     assert about["ground"]["calibration"]["camera"]["height"] == pytest.approx(6.0, rel=0.4)
     assert '"ground":[' in (run / "tracks.jsonl").read_text()
 

@@ -73,6 +73,20 @@ def test_twice_the_same_bytes_and_one_object_for_machines(tmp_path: Path, run: P
     assert told["picture"] == str(tmp_path / "two-drawn.png")
 
 
+def test_a_run_that_had_zones_is_told_to_tell_less(tmp_path: Path, run: Path):
+    learnt, again = tmp_path / "learnt.json", tmp_path / "again"
+    assert learn(run, "-o", learnt)[0] == 0
+    about = json.loads((run / "run.json").read_text())
+    about["zones"] = json.loads(learnt.read_text())
+    again.mkdir()
+    for one in run.iterdir():
+        (again / one.name).write_bytes(one.read_bytes())
+    (again / "run.json").write_text(json.dumps(about))
+    code, said, wrong = learn(again, "-o", tmp_path / "second.json")
+    assert code == 0, wrong
+    assert "was tracked with zones" in said
+
+
 def test_a_film_that_is_gone_is_a_note_and_the_picture_is_dark(tmp_path: Path, run: Path):
     (tmp_path / "film").rename(tmp_path / "elsewhere")
     code, said, wrong = learn(run, "-o", tmp_path / "zones.json")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -115,8 +116,15 @@ class Plan:
 
     def _of_ground(self) -> tuple[str, ...]:
         """What the user should know of the ground that was to be estimated."""
-        if self.estimate is None or not self.estimate.verdict:
+        if self.estimate is None:
             return ()
+        told = self.estimate
+        if not told.verdict:
+            off = [math.sqrt(told.covariance[place, place]) for place in (3, 1)]
+            return (
+                f"the ground plane is estimated from {told.people} people: the camera is {told.height:.1f} m "
+                f"± {told.height * off[0]:.1f} above it, tilted by {math.degrees(told.tilt):.0f}° ± {math.degrees(off[1]):.0f}",
+            )
         return (f"the ground plane is not known ({self.estimate.verdict}); give --calibration FILE",)
 
     def _of_marks(self) -> tuple[str, ...]:

@@ -73,6 +73,8 @@ FAULTS = {
     "star": (collection(feature(name="*")), "zone 1 has the name '*'"),
     "kind": (collection(feature(), feature("entri", "two")), "zone 2 'two': 'entri' is not a kind of zone; did you mean 'entry'?"),
     "kind of no word": (collection(feature(4)), "zone 1 'door': '4' is not a kind of zone; there are: entry, exit"),
+    "no kind": (collection({"type": "Feature", "properties": {"name": "door"}}), "zone 1 'door' has no kind; give it one"),
+    "rules of another name": ({**collection(feature()), "rule": []}, "'rule' is not a member of a file of zones; did you mean 'rules'?"),
     "line": (collection(feature(geometry={"type": "LineString"})), "zone 1 'door': its geometry is 'LineString'; wanted is a Polygon"),
     "no geometry": (collection(feature(geometry=None)), "zone 1 'door': its geometry is nothing"),
     "no ring": (collection(feature(ring=7)), "zone 1 'door': a ring must be a list of points [x, y]"),

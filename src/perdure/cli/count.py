@@ -200,7 +200,7 @@ def _words(told: dict[str, Any], output: Path | None) -> str:
                     str(one["left"]),
                     f"{occupancy['mean']:.2f}",
                     str(occupancy["max"]),
-                    *(f"{dwell[word]:.2f}" for word in ("median", "mean", "max")),
+                    *(f"{dwell[word]:.2f}" if dwell["max"] else "-" for word in ("median", "mean", "max")),
                     _shown(one["speed"]),
                 ]
             )

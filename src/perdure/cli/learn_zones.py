@@ -62,6 +62,11 @@ def learn(
     picture = _checked(run, output, draw, overwrite=overwrite)
     folder = RunFolder.open(run)
     _refuse_to_replace_the_film(picture, folder, source)
+    if folder.read_about().get("zones"):
+        words = (
+            "this run was tracked with zones, which decide where things are born and kept; one without tells more"
+        )
+        print(f"perdure: note: {words}", file=sys.stderr)
     size = _size(folder)
     looks = _looks(folder, size, source)
     learnt = learnt_from(folder.settled_by_frame(), _times(folder), size, [one.image for one in looks])

@@ -218,6 +218,7 @@ def _of_points(given: Mapping[str, Json], size: tuple[int, int]) -> Ground:
             if key not in one:
                 raise ValueError(f'point {number} has no "{key}", its place [x, y] {what}; or give "distances"')
             found.append(_vector(one[key], f"point {number}, {key}", 2))
+        _check_inside(image[-1], number, size)
     if "tape" in given:
         raise ValueError('"tape" goes with "distances"; leave it out')
     return of_points(image, places, size, noise=noise, mirrored=_flag(given, "mirrored"))
@@ -235,6 +236,7 @@ def _of_distances(given: Mapping[str, Json], rows: list[Json], noise: float, siz
             raise ValueError(f'point {number} must have an "image" [x, y] and a "name" of its own')
         names.append(one["name"])
         image.append(_vector(one["image"], f"point {number}, image", 2))
+        _check_inside(image[-1], number, size)
     pairs, lengths = [], []
     for row in given["distances"] if isinstance(given["distances"], list) else [None]:
         if not (isinstance(row, list) and len(row) == 3):
@@ -248,6 +250,15 @@ def _of_distances(given: Mapping[str, Json], rows: list[Json], noise: float, siz
         lengths.append(_number(row[2], f"the distance of {row[0]} and {row[1]}", low=1e-9))
     tape = _number(given.get("tape", 0.01), "tape", low=1e-6, high=0.5)
     return of_distances(image, pairs, lengths, size, noise=noise, tape=tape)
+
+
+def _check_inside(place: list[float], number: int, size: tuple[int, int]) -> None:
+    """Refuse a point that is not in the picture: it was taken in one of another size."""
+    if not (0 <= place[0] <= size[0] and 0 <= place[1] <= size[1]):
+        raise ValueError(
+            f"point {number}, image = [{place[0]:g}, {place[1]:g}], is outside the picture of {size[0]}x{size[1]} pixels; "
+            'take it in a frame of this film, or mend "frame"'
+        )
 
 
 _READERS: Mapping[str, Callable[[Mapping[str, Json], tuple[int, int]], Ground]] = {

@@ -28,6 +28,7 @@ from perdure.scene.zones import ANYWHERE, KINDS, SETTINGS, Polygon, Rule, Zone, 
 Json = Any
 _LARGEST = 8 << 20  # bytes of a file
 _MOST = 1000  # zones, and rules
+_MEMBERS = ("type", "features", "rules")  # that we read; others are anybody's
 _POINTS = 10000  # of one zone
 _LONGEST = 3600.0  # s that a rule may wait
 _WORDS = ("lost_in", "found_in", "after", "within", "never")
@@ -99,6 +100,11 @@ def zones_of_json(written: Json, width: int = 0, height: int = 0) -> Zones:
     """Return the zones that a GeoJSON value holds; FormatError names what is wrong."""
     if not isinstance(written, Mapping) or written.get("type") != "FeatureCollection":
         raise FormatError('not GeoJSON of zones: wanted is {"type": "FeatureCollection", "features": [...]}')
+    misspelt = [
+        key for key in written if key not in _MEMBERS and difflib.get_close_matches(str(key).lower(), ("rules",))
+    ]
+    if misspelt:
+        raise FormatError(unknown_name("member of a file of zones", misspelt[0], ("rules",)))
     features, rules = written.get("features"), written.get("rules", [])
     if not isinstance(features, list):
         raise FormatError('"features" must be a list of zones')
@@ -140,6 +146,8 @@ def _zone(number: int, feature: Json, width: int, height: int) -> Zone:
             f'{here} has the name {shown(name)}; give it a word or more in "properties", not {ANYWHERE!r}'
         )
     here = f"zone {number} {name!r:.80}"
+    if kind is None:
+        raise FormatError(f'{here} has no kind; give it one in "properties": {", ".join(KINDS)}')
     if not isinstance(kind, str) or kind not in KINDS:
         raise FormatError(f"{here}: {unknown_name('kind of zone', shown(kind).strip(chr(39)), KINDS)}")
     try:
