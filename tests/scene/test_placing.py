@@ -62,6 +62,20 @@ def test_who_is_not_seen_has_a_place_and_no_speed():
     assert set(long_after.of) == {8}  # nothing is kept for ever
 
 
+def test_the_speed_of_who_comes_out_again_begins_anew():
+    paths, film = Paths.none(), list(walk([7], [[-2.0, 10]], [[1.4, 0]], np.arange(60) / 20))
+    for frame in film:
+        time = float(frame.times[0])
+        if 1.0 <= time < 1.2:  # believed to stand where she went behind something
+            frame = frame.replace(status=[Status.OCCLUDED], boxes=film[19].boxes)
+        paths, rows = placed(GROUND, paths, frame)
+        speed = rows.ground[0].speed
+        if time < 0.4 - 1e-9 or 1.0 <= time < 1.6 - 1e-9:
+            assert speed is None
+        else:
+            assert speed == pytest.approx(1.4, abs=0.02)
+
+
 def test_the_table_has_columns_of_metres_where_any_are_known():
     pytest.importorskip("pandas")
     frame = next(walk([7], [[-2.0, 10]], [[1.4, 0]], [0.0]))

@@ -2,7 +2,8 @@
 
 A row stands where the middle of its box's lower edge is: the box is the whole thing as believed, so that hidden feet
 are where the tracker believes them. A box that ends at the picture's lower border says nothing of feet: no place. The
-speed is that of the straight line fitted to the places of the last second, of rows that were seen; it needs 0.4 s.
+speed is that of the straight line fitted to the places of the last second, of rows that were seen; it needs 0.4 s, and
+begins anew when one who was hidden is seen again: where he comes out is not where he was believed to be.
 """
 
 from __future__ import annotations
@@ -53,6 +54,8 @@ def placed(ground: Ground, paths: Paths, rows: Tracks) -> tuple[Paths, Tracks]:
         new = own[seen[own]]
         path = np.concatenate([paths.of.get(identity, _NOWHERE), np.c_[rows.times[new], where[new]]])
         path = path[np.argsort(path[:, 0], kind="stable")]
+        hidden = rows.times[rows.ids == identity][~np.isin(rows.status[rows.ids == identity], _SEEN)]
+        path = path[path[:, 0] > hidden.max(initial=-np.inf)]
         for row in own.tolist():
             speed = _speed(path, float(rows.times[row])) if seen[row] else None
             found[row] = Place(round(float(where[row, 0]), 3), round(float(where[row, 1]), 3), speed)
