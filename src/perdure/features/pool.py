@@ -1,0 +1,32 @@
+"""The pool of features: what two seen things can be compared by (section 2.1 of the multi-feature tracker).
+
+A feature is a file of its own (`perdure.features.feature` says what it must offer) and a row in POOL. A weight of 0
+leaves it out: it is then not computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perdure.features.area import Area
+from perdure.features.displacement import Displacement
+from perdure.features.feature import Feature, Float
+from perdure.features.ground_displacement import GroundDisplacement
+from perdure.features.shape_ratio import ShapeRatio
+from perdure.types import Scene
+
+POOL: Mapping[str, Callable[[Scene], Feature]] = {  # in the paper's order, k = 1 … 8; then ours
+    "displacement_3d": lambda scene: GroundDisplacement(scene.ground),
+    "displacement_2d": lambda scene: Displacement(),
+    "shape_ratio": lambda scene: ShapeRatio(),
+    "area": lambda scene: Area(),
+}
+PAPER = tuple(POOL)[:8]
+
+
+def known(rows: Float) -> NDArray[np.bool_]:
+    """Return of which rows (N, ...) of a feature something is known (N,): those that are not all zeros."""
+    return np.asarray(rows.reshape(len(rows), -1).any(axis=1))
