@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.area import Area
+from perdure.features.covariance import ColourCovariance
 from perdure.features.displacement import Displacement
+from perdure.features.dominant import DominantColours
 from perdure.features.feature import Feature, Float
 from perdure.features.ground_displacement import GroundDisplacement
+from perdure.features.histogram import ColourHistogram
 from perdure.features.shape_ratio import ShapeRatio
 from perdure.types import Scene
 
@@ -23,6 +26,9 @@ POOL: Mapping[str, Callable[[Scene], Feature]] = {  # in the paper's order, k = 
     "displacement_2d": lambda scene: Displacement(),
     "shape_ratio": lambda scene: ShapeRatio(),
     "area": lambda scene: Area(),
+    "histogram": lambda scene: ColourHistogram(),
+    "covariance": lambda scene: ColourCovariance(),
+    "dominant": lambda scene: DominantColours(),
 }
 PAPER = tuple(POOL)[:8]
 
