@@ -25,7 +25,7 @@ class ColourCovariance:
     """max(0, 1 - d / D_max), d the pyramid's distance of covariances."""
 
     farthest: float = parameter(
-        4.0, "distance of covariances that have nothing in common", low=0.01, high=1000.0, symbol="D_cov_max"
+        6.0, "distance of covariances that have nothing in common", low=0.01, high=1000.0, symbol="D_cov_max"
     )
     levels: int = parameter(3, "levels of the pyramid", low=1, high=4)
     fewest: int = parameter(30, "pixels that a cell must have to count", unit="px", low=1, high=100000)
