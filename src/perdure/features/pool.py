@@ -18,6 +18,7 @@ from perdure.features.dominant import DominantColours
 from perdure.features.feature import Feature, Float
 from perdure.features.ground_displacement import GroundDisplacement
 from perdure.features.histogram import ColourHistogram
+from perdure.features.hog import HogPoints
 from perdure.features.shape_ratio import ShapeRatio
 from perdure.types import Scene
 
@@ -27,6 +28,7 @@ POOL: Mapping[str, Callable[[Scene], Feature]] = {  # in the paper's order, k = 
     "shape_ratio": lambda scene: ShapeRatio(),
     "area": lambda scene: Area(),
     "histogram": lambda scene: ColourHistogram(),
+    "hog": lambda scene: HogPoints(),
     "covariance": lambda scene: ColourCovariance(),
     "dominant": lambda scene: DominantColours(),
 }
