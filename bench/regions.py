@@ -4,7 +4,7 @@
 
 `measure(method, clip)` is the whole of it; everything else reads truth or prints tables.
 
-Methods: every detector of `perdure.detect` that needs pixels, as `perdure track` runs it on a file, its first
+Methods: every detector of `perdure.detect` that needs pixels and gives silhouettes, as `perdure track` runs it on a file, its first
 look over all of it included, and as NAME-cold without that look, as on a live source; MOG2, KNN, GSOC, LSBP,
 CNT of cv2 at their defaults, each cold at the first frame, fed BGR, shadow pixels (127) counted as background.
 A peer's foreground becomes regions by the stage that ours uses: `regions_of` of
@@ -76,7 +76,7 @@ PEERS: dict[str, Callable[[], Any]] = {
     "LSBP": cv2.bgsegm.createBackgroundSubtractorLSBP,
     "CNT": cv2.bgsegm.createBackgroundSubtractorCNT,
 }
-OURS = tuple(name for name, kind in DETECTORS.items() if kind.needs_pixels)
+OURS = tuple(name for name, kind in DETECTORS.items() if kind.needs_pixels and name != "people")  # it has no masks
 COLD = {f"{name}-cold": name for name in OURS if hasattr(DETECTORS[name], "prepare")}
 METHODS = (*OURS, *COLD, *PEERS)
 COMPOSITES = ("attractive", "behind2", "crossing2", "crowd8", "group4")

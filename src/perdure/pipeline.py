@@ -201,7 +201,7 @@ def plan(
     tracker : str or None
         A name of `perdure.trackers.TRACKERS`; None for 'compound', or with `init` for the first that follows marks.
     detector : str, Path or None
-        'background', or a file of regions (`.jsonl` of `perdure detect`, or MOTChallenge `.txt`);
+        'background', 'people', or a file of regions (`.jsonl` of `perdure detect`, or MOTChallenge `.txt`);
         None for the background, or for `det/det.txt` of a MOTChallenge folder without images.
     init : str, Path, (H, W) array of whole numbers, pair of one of these and its frame, or list of these
         What the user marked, an index PNG or array (the value is the id, 0 nothing), a box 'x,y,w,h' or a polygon
@@ -363,8 +363,10 @@ def zoned(scene: Scene, zones: str | Path | Zones) -> Scene:
 
 def detector_name(detector: str | Path | None) -> str:
     """Return which kind of detector the user's word means."""
-    if detector is None or str(detector) == "background":
+    if detector is None:
         return "background"
+    if str(detector) in ("background", "people"):
+        return str(detector)
     if is_file(detector):
         return "recorded"
     if Path(str(detector)).suffix in (".txt", ".jsonl", ".csv"):

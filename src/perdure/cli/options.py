@@ -104,7 +104,7 @@ DetectorOption = Annotated[
     typer.Option(
         "--detector",
         metavar="NAME|FILE",
-        help="'background' needs nothing; or a file of regions: .jsonl of `perdure detect`, MOTChallenge .txt. "
+        help="'background' needs nothing; 'people' finds upright people in each picture by itself; or a file of regions: .jsonl of `perdure detect`, MOTChallenge .txt. "
         "Default: background, or det/det.txt of a MOTChallenge folder without images.",
         show_default=False,
     ),

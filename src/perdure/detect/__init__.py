@@ -6,9 +6,15 @@ from typing import Any
 
 from perdure.detect.background import Background
 from perdure.detect.marked import Mark, Marked
+from perdure.detect.people import People
 from perdure.detect.recorded import Recorded
 from perdure.detect.with_marks import WithMarks
 
-__all__ = ["DETECTORS", "Background", "Mark", "Marked", "Recorded", "WithMarks"]
+__all__ = ["DETECTORS", "Background", "Mark", "Marked", "People", "Recorded", "WithMarks"]
 
-DETECTORS: dict[str, type[Any]] = {"background": Background, "recorded": Recorded, "marked": Marked}
+DETECTORS: dict[str, type[Any]] = {
+    "background": Background,
+    "people": People,
+    "recorded": Recorded,
+    "marked": Marked,
+}
