@@ -1,6 +1,14 @@
 """What all tests share."""
 
+import os
+
 from hypothesis import settings
+
+# A process for each core runs tests; more threads would only turn in circles for a core that is taken. What must hold
+# with any number of threads asks for them itself. Read when NumPy and OpenCV are loaded, here and in the processes
+# that tests start; not OPENBLAS_NUM_THREADS, which would win over what such a test says.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 
 # The first call of a kernel compiles it; how long that takes is no property of the code under test.
 settings.register_profile("perdure", deadline=None, derandomize=True)
