@@ -1,13 +1,16 @@
-"""The command line as a user types it, in a process of its own where exit codes and signals matter."""
+"""The command line as a user types it; in a process of its own where loading, signals and streams matter."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import functools
 import http.server
+import io
 import json
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +23,7 @@ import numpy as np
 import pytest
 from worlds import two_apart
 
+from perdure.cli import main
 from perdure.files.log import read_log
 from perdure.files.mot import read_tracks
 from perdure.metrics.clear import clear
@@ -29,6 +33,22 @@ PERDURE = [sys.executable, "-c", "from perdure.cli import main; main()"]
 
 
 def perdure(*words: object, at: Path) -> subprocess.CompletedProcess[str]:
+    """What comes of these words, without the process that would have to load everything first."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(at),
+        pytest.MonkeyPatch.context() as patched,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        patched.setattr(sys, "argv", ["perdure", *map(str, words)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    return subprocess.CompletedProcess(words, ended.value.code, out.getvalue(), err.getvalue())
+
+
+def perdure_alone(*words: object, at: Path) -> subprocess.CompletedProcess[str]:
+    """What comes of these words in a process that has loaded nothing else."""
     return subprocess.run([*PERDURE, *map(str, words)], cwd=at, capture_output=True, text=True, timeout=120)
 
 
@@ -48,7 +68,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with `walk.avi`, two walkers, and the run `first` over it."""
     folder = tmp_path_factory.mktemp("place")
     write_film(folder / "walk.avi", [frame.image for frame in two_apart().frames()])
-    done = perdure("track", "walk.avi", "-o", "first", "--json", at=folder)
+    done = perdure_alone("track", "walk.avi", "-o", "first", "--json", at=folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -218,7 +238,7 @@ def test_parameters_of_a_file_count_and_those_of_the_command_line_win(place: Pat
 
 
 def test_what_detect_wrote_tracks_like_the_video_itself(place: Path):
-    done = perdure("detect", "walk.avi", "-o", "seen.jsonl", "--json", at=place)
+    done = perdure_alone("detect", "walk.avi", "-o", "seen.jsonl", "--json", at=place)
     assert json.loads(done.stdout)["frames"] == 40
     perdure("track", "walk.avi", "-o", "recorded", "--no-video", "--detector", "seen.jsonl", at=place)
     for name in ("tracks.jsonl", "tracks.txt", "events.csv"):
@@ -241,7 +261,7 @@ def test_a_motchallenge_folder_without_images_needs_no_detector_named(place: Pat
 
 
 def test_draw_makes_the_film_again(place: Path):
-    done = perdure("draw", "walk.avi", "first", "-o", "film.webm", at=place)
+    done = perdure_alone("draw", "walk.avi", "first", "-o", "film.webm", at=place)
     assert done.returncode == 0, done.stderr
     with av.open(str(place / "film.webm")) as film:
         assert sum(1 for _ in film.decode(video=0)) == 40
@@ -249,7 +269,7 @@ def test_draw_makes_the_film_again(place: Path):
 
 
 def test_export_writes_what_counts_as_mot_and_csv(place: Path):
-    perdure("export", "first", "--format", "mot", "-o", "out.txt", at=place)
+    assert perdure_alone("export", "first", "--format", "mot", "-o", "out.txt", at=place).returncode == 0
     assert (place / "out.txt").read_bytes() == (place / "first/tracks.txt").read_bytes()
     perdure("export", "first", "--format", "csv", "-o", "out.csv", at=place)
     rows = list(csv.DictReader((place / "out.csv").read_text().splitlines()))
@@ -260,7 +280,7 @@ def test_export_writes_what_counts_as_mot_and_csv(place: Path):
 def test_a_truncated_video_is_tracked_up_to_its_damage_and_says_so(place: Path):
     data = (place / "walk.avi").read_bytes()
     (place / "cut.avi").write_bytes(data[: len(data) * 3 // 4])
-    done = perdure("track", "cut.avi", "-o", "cut", "--json", at=place)
+    done = perdure_alone("track", "cut.avi", "-o", "cut", "--json", at=place)
     assert done.returncode == 3, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["status"] == "damaged"
@@ -328,7 +348,7 @@ def test_draw_over_a_damaged_film_says_so(place: Path):
 
 
 def test_a_usage_mistake_is_one_line_with_meaning_and_range(place: Path):
-    done = perdure("track", "walk.avi", "-o", "x", "--patience", "long", at=place)
+    done = perdure_alone("track", "walk.avi", "-o", "x", "--patience", "long", at=place)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert "0 to 3600 s" in done.stderr
@@ -342,7 +362,7 @@ def test_detections_for_a_part_of_the_film_only_are_worth_a_note(place: Path):
 
 @pytest.mark.parametrize("damage", ['{"window": null}', '{"reporting": 3}', "[" * 100_000, "[]", "nonsense"])
 def test_a_damaged_run_json_is_named(place: Path, damage: str):
-    perdure("track", "walk.avi", "-o", "hurt", "--no-video", "--overwrite", at=place)
+    shutil.copytree(place / "first", place / "hurt", dirs_exist_ok=True)
     (place / "hurt/run.json").write_text(damage)
     done = perdure("export", "hurt", "-o", "hurt.txt", "--overwrite", at=place)
     assert (done.returncode, "run.json" in done.stderr, "Traceback" in done.stderr) == (2, True, False)
