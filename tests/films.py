@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -47,9 +48,14 @@ class Thing(NamedTuple):
         middle = self.path(k)
         if middle is None:
             return
-        skin = texture(7 + self.colour[0], self.colour, HEIGHT, WIDTH)
+        skin = _skin(self.colour)
         moved = np.roll(skin, (middle[1] - HEIGHT // 2, middle[0] - WIDTH // 2), axis=(0, 1))
         picture[self.bits(k)] = moved[self.bits(k)]
+
+
+@functools.cache
+def _skin(colour: tuple[int, int, int]) -> np.ndarray:
+    return texture(7 + colour[0], colour, HEIGHT, WIDTH)
 
 
 def film(*things: Thing, count: int, pan: int = 0, post: tuple[int, int] | None = None) -> list[Frame]:
