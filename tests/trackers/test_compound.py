@@ -334,6 +334,31 @@ def test_a_mistake_that_shows_when_they_part_is_corrected_backwards():
     assert [names(said.tracks, world, frame) for frame in (22, 43, 60)] == [[1, 2]] * 3
 
 
+def test_who_goes_from_one_company_straight_into_another_is_in_that_one():
+    """Red passes before blue and is before green, who comes slowly, when blue comes out alone."""
+    world = street(
+        person(along((0, 127, 100), (50, 167, 100)), GREEN),
+        person(along((0, 40, 96), (40, 280, 96)), BLUE),
+        person(along((0, 280, 104), (40, 40, 104))),
+        count=40,
+    )
+    said = story(world)
+    assert names(said.tracks, world, 8) == names(said.tracks, world, 39) == [2, 1, 3]
+
+
+def test_two_who_have_parted_are_not_exchanged_for_where_they_went_later():
+    """Red passes before blue, then before green, who stands; red and blue stay who they are when both are free."""
+    world = street(
+        person(along((0, 120, 92), (60, 120, 92)), GREEN),
+        person(along((0, 72, 96), (40, 232, 96)), BLUE),
+        person(along((0, 248, 104), (40, 88, 104))),
+        count=40,
+    )
+    said = story(world)
+    assert names(said.tracks, world, 10) == names(said.tracks, world, 39) == [1, 2, 3]
+    assert not said.told("exchanged")
+
+
 def test_rule_c_a_third_who_comes_out_of_a_group_is_new_and_the_others_stay_who_they_are():
     third = person(lambda k: None if k < 30 else (149 + 5 * max(k - 50, 0), 100), GREEN)
     world = street(
@@ -375,7 +400,7 @@ def test_a_third_who_joins_unseen_can_be_mislabelled_and_the_events_show_it():
     assert taken in (1, 2)
     (resolved,) = [event for event in said.events if event.kind == "resolved" and event.why.startswith("rule")]
     assert resolved.why.startswith("rule b")
-    assert resolved.confidence < 0.7
+    assert resolved.confidence < 0.75  # nothing speaks for her but that she was believed there
 
 
 def test_the_tracks_of_a_group_and_of_each_person_in_it_go_on():

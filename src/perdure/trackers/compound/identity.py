@@ -12,7 +12,7 @@ from perdure.features.appearance import alike, look, signature
 from perdure.maths import polyline
 from perdure.trackers.compound.companies import Pair
 from perdure.trackers.compound.meetings import Compound, Meeting
-from perdure.trackers.compound.targets import CENTRE, Float, around, extent, generic_points
+from perdure.trackers.compound.targets import CENTRE, Float, Targets, around, extent, generic_points
 from perdure.types import Event, Frame, Regions, Renamed
 
 Place = NDArray[np.float64]
@@ -62,7 +62,11 @@ class Judge:
         return replace(meeting, events=(*meeting.events, event) if name else meeting.events), row
 
     def doubt(self, meeting: Meeting, row: int, rival: int) -> Verdict:
-        """Say how likely it is that `rival` is where `row` is believed, and the other way round."""
+        """Say how likely it is that `rival` is where `row` is believed, and the other way round.
+
+        Where both went tells who is who while they part. Of two who have been in regions of their own since, the
+        frozen motion tells nothing any more: they stay who they are unless the colours speak against it.
+        """
         targets = meeting.targets
         here, there = self._place(meeting, row), self._place(meeting, rival)
         one, other = targets.ice[row], targets.ice[rival]
@@ -72,10 +76,17 @@ class Judge:
             moved = by_order(one[1:3], other[1:3], here, there, size, since)
         else:
             moved = by_motion(one, other, here, there, size, self.frame.time)
+        if moved.odds > 0 and not self._lately_together(targets, row, rival):
+            moved = Verdict(0.0, f"{moved.why}, but they parted before")
         seen = self._by_colours(meeting, row, rival) if self.colour else None
         if seen is None:
             return moved
         return Verdict(moved.odds + self.colour * seen, f"{moved.why}, colours {-seen:+.2f} for who was believed")
+
+    def _lately_together(self, targets: Targets, row: int, rival: int) -> bool:
+        """Whether two share a region, or did a moment ago."""
+        keys = {int(targets.keys[row]), int(targets.keys[rival])}
+        return any({pair.one, pair.other} == keys for pair in self.pairs)
 
     def _place(self, meeting: Meeting, row: int) -> Place:
         """Where a target is: the middle of its region where it is alone, else where it is believed."""
