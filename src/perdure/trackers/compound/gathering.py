@@ -20,6 +20,7 @@ _YOUNG = 1.5  # s, for which a target may turn out to be a piece
 _FILLED = 0.6  # of a region, that its targets fill at least
 _OWN = 0.5  # share that is granted to whoever has a region for herself
 _SPECK = 0.1  # of a target's area; a smaller region does not hold it while there are others
+_OVER = 0.5  # share of a member in another's region, where she may have gone
 _PIECE = 0.5  # of a region inside a target, that makes it a piece
 
 
@@ -76,28 +77,83 @@ def gather(
     if not knots:
         return held
     alone = list(zip(rows[single].tolist(), regions[single].tolist(), strict=True))
-    for knot in _with_neighbours(knots, alone, sight.regions.boxes, sight.near):
-        members = _members(targets, knot, fresh, rows[single])
-        if len(members):
-            _place(held, targets, members, np.array(knot.regions), expected, sight)
+    nodes = [*knots, *(Knot((row,), (region,)) for row, region in alone)]
+    over = _gone_over(targets, nodes, expected, sight.regions.boxes) if sight.near >= 0 else set()
+    companies = _with_neighbours(nodes, len(knots), sight.regions.boxes, sight.near, over)
+    members = [_members(targets, knot, fresh, rows[single]) for knot in companies]
+    twice, times = np.unique(np.concatenate(members), return_counts=True)
+    if (times > 1).any():
+        members = _decided(held, targets, companies, members, twice[times > 1], expected, sight)
+    for knot, some in zip(companies, members, strict=True):
+        if len(some):
+            _place(held, targets, some, np.array(knot.regions), expected, sight)
     return held
 
 
-def _with_neighbours(knots: list[Knot], alone: list[tuple[int, int]], boxes: Boxes, near: float) -> list[Knot]:
-    """Knots, joined with each other and with visible targets where their regions are near."""
-    nodes = [*knots, *(Knot((row,), (region,)) for row, region in alone)]
+def _decided(
+    held: Held,
+    targets: Targets,
+    knots: list[Knot],
+    members: list[Index],
+    twice: Index,
+    expected: Boxes,
+    sight: Sight,
+) -> list[Index]:
+    """Members of the knots, those that are in two of them left only where more of them is seen.
+
+    Who is hidden in her compound may have gone over into the region of somebody else.
+    """
+    share = np.full((len(knots), len(targets)), -1.0, np.float32)  # (K, N); of who is not in a knot -1
+    for one, (knot, some) in enumerate(zip(knots, members, strict=True)):
+        if np.isin(some, twice).any():
+            trial = Held(held.region.copy(), held.boxes.copy(), held.share.copy(), {}, {})
+            _place(trial, targets, some, np.array(knot.regions), expected, sight)
+            share[one, some] = trial.share[some]
+    best = share.argmax(axis=0)  # (N,)
+    return [some[~np.isin(some, twice) | (best[some] == one)] for one, some in enumerate(members)]
+
+
+def _gone_over(targets: Targets, nodes: list[Knot], expected: Boxes, boxes: Boxes) -> set[tuple[int, int]]:
+    """Pairs of a company and a node, where a member of the company is expected in the region of the node.
+
+    She has gone on with others while what was left of her company parted from them.
+    """
+    found = set()
+    for one, node in enumerate(nodes):
+        rows = np.array(node.rows, np.intp)
+        members = np.flatnonzero(
+            targets.frozen & np.isin(targets.within, targets.keys[rows[targets.temporary[rows]]])
+        )
+        if len(members) < 2:
+            continue
+        whole = np.maximum(areas(expected[members]), 1e-6)
+        shares = [
+            (intersections(expected[members], boxes[list(other.regions)]) / whole[:, None]).max(axis=1)
+            for other in nodes
+        ]
+        home = shares[one]  # (M,)
+        found |= {(one, other) for other, away in enumerate(shares) if ((away >= _OVER) & (away > home)).any()}
+    return found
+
+
+def _with_neighbours(
+    nodes: list[Knot], count: int, boxes: Boxes, near: float, over: set[tuple[int, int]]
+) -> list[Knot]:
+    """The first `count` nodes, which are knots, joined with each other and with visible targets where they belong together.
+
+    That is where their regions are near, and where a member of one has gone over into the other.
+    """
     places = [boxes[list(node.regions)] for node in nodes]
     widths = [float(sizes(place).min()) for place in places]
     joined = list(range(len(nodes)))  # the first node of each one's company
-    for one in range(len(knots)):
+    for one in range(count):
         for other in range(len(nodes)):
             apart = joined[one] != joined[other]
-            if apart and distances_between(places[one], places[other]).min() <= near * min(
-                widths[one], widths[other]
-            ):
+            reach = near * min(widths[one], widths[other])
+            if apart and ((one, other) in over or distances_between(places[one], places[other]).min() <= reach):
                 first, last = sorted((joined[one], joined[other]))
                 joined = [first if company == last else company for company in joined]
-    kept = sorted({joined[number] for number in range(len(knots))})
+    kept = sorted({joined[number] for number in range(count)})
     companies = [[node for node, company in zip(nodes, joined, strict=True) if company == one] for one in kept]
     return [
         Knot(
