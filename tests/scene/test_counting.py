@@ -55,6 +55,37 @@ def test_three_go_in_two_go_out_and_who_turns_or_stands_on_the_line_is_not_count
     assert [one.id for one in counts.of_line("door", "out")] == [4, 5]
 
 
+def parting(at: int, second: int = 2, width: int = 12, first_ends: int = 40) -> Tracks:
+    """Two of `width` side by side go 2 px a frame to the right, the right one beyond x = 60 from frame 18; id 1 is
+    both until frame `at`, then the right one until `first_ends`, and id `second` is the left one."""
+    rows = []
+    for k in range(40):
+        x = 12 + 2 * k
+        both = (x, 20, x + 24, 40)
+        if k < first_ends:
+            rows.append((k, 1, both if k < at else (x + width, 20, x + 24, 40)))
+        if k >= at:
+            rows.append((k, second, (x, 20, x + width, 40)))
+    frames, ids, boxes = zip(*rows, strict=True)
+    return Tracks.of(frames=frames, times=np.array(frames) / 10, ids=ids, boxes=boxes)
+
+
+def test_who_parts_from_another_just_beyond_a_line_crossed_it_with_him():
+    """The left one's foot, at 18 + 2 k, is at the line in frame 21; they part in frame 25."""
+    first, other = crossings(parting(at=25), [DOOR], away=2)
+    assert (first.id, first.direction, other.id, other.direction) == (1, "in", 2, "in")
+    assert other.time == pytest.approx(2.1, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    "tracks",
+    [parting(at=34), parting(at=25, width=4), parting(at=25, first_ends=25)],
+    ids=["long beyond the line", "a piece", "the same with another id"],
+)
+def test_who_did_not_come_with_another_over_the_line_is_not_counted(tracks):
+    assert [one.id for one in crossings(tracks, [DOOR], away=2)] == [1]
+
+
 def test_a_crossing_has_its_place_its_time_between_frames_and_its_speed():
     (first, *_) = count(street().truth(), lines=[DOOR], away=5).of_line("door", "in")
     assert first.time == pytest.approx(55 / 30)  # from x = 5 at 30 px/s

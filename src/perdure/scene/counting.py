@@ -9,6 +9,10 @@ way. Boxes jitter, therefore what happens near an edge is settled only when the 
 line was crossed as often as its crossings there do not cancel out, which is once or not at all, at the time of the
 last one; somebody was in a zone if he got so deep into it, and he left it if he got so far out.
 
+Two who come as one region are two when they part. A new target, no mere piece, that was part of another's box just before, while that
+other goes on, has come with it: for the last second before they parted it went as the other did, at the place beside
+it where it was seen first, and what both crossed in that second both crossed.
+
 >>> right = Tracks.of(frames=[0, 1, 2], times=[0, 1, 2], ids=[1, 1, 1], boxes=[[x, 0, x + 2, 9] for x in (0, 10, 20)])
 >>> [(one.frame, one.time, one.direction) for one in crossings(right, [Line("door", ((9, 20), (9, 0)))], away=2)]
 [(1, 0.8, 'in')]
@@ -34,6 +38,10 @@ from perdure.types import Tracks
 Float = NDArray[np.float64]
 POINTS = ("foot", "centre")
 IN, OUT = "in", "out"
+_WITH = 1.0  # s for which who parts from another is thought to have come with it
+_JUST = 0.25  # s, in which the other was seen before they parted, and for which both must be seen after it
+_INSIDE = 0.7  # share of the new one's box in the other's before
+_PIECE = 0.25  # of the other's area when they have parted; what is smaller is a piece of it
 _SPAN = 0.25  # s before and after, over which a speed in pixels is measured
 
 
@@ -203,7 +211,8 @@ def crossings(
     size: tuple[int, int] | None = None,
 ) -> list[Crossing]:
     """Return who crossed which line, in the order of time; arguments are those of `count`."""
-    found = [one for path in _paths(tracks, point, size) for line in lines for one in _crossings(path, line, away)]
+    paths = _with_their_past(list(_paths(tracks, point, size)))
+    found = [one for path in paths for line in lines for one in _crossings(path, line, away)]
     return sorted(found, key=lambda one: (one.time, one.id))
 
 
@@ -239,6 +248,7 @@ class _Path:
     frames: NDArray[np.int64]
     times: Float
     points: Float  # (N, 2)
+    boxes: Float  # (N, 4)
     ground_speeds: Float  # (N,) m/s; nan where not known
 
     def at(self, time: float) -> Float:
@@ -273,8 +283,58 @@ def _paths(tracks: Tracks, point: str, size: tuple[int, int] | None) -> Iterator
                 tracks.frames[rows],
                 tracks.times[rows],
                 places[rows],
+                np.asarray(tracks.boxes[rows], np.float64),
                 np.array(speeds, np.float64)[rows],
             )
+
+
+def _with_their_past(paths: Sequence[_Path]) -> list[_Path]:
+    """The paths, those of who parted from another beginning up to `_WITH` seconds earlier, as the other's went."""
+    spans = np.array([(one.times[0], one.times[-1]) for one in paths]).reshape(-1, 2)
+    found = []
+    for one in paths:
+        begin = one.times[0]
+        there = np.flatnonzero((spans[:, 0] < begin - _MOMENT) & (spans[:, 1] >= begin + _JUST - _MOMENT))
+        other = _parted_from(one, [paths[number] for number in there.tolist()])
+        found.append(one if other is None else _led_by(one, other))
+    return found
+
+
+def _parted_from(one: _Path, others: Sequence[_Path]) -> _Path | None:
+    """Of whom, of those seen before and after it begins, the first box of a path was a part; None if of nobody."""
+    begin = float(one.times[0])
+    if one.times[-1] - begin < _JUST - _MOMENT:
+        return None
+    best, share = None, _INSIDE
+    for other in others:
+        row = int(np.searchsorted(other.times, begin - _MOMENT)) - 1  # his last before
+        if begin - other.times[row] > _JUST:
+            continue
+        corners = (
+            np.maximum(one.boxes[0, :2], other.boxes[row, :2]),
+            np.minimum(one.boxes[0, 2:], other.boxes[row, 2:]),
+        )
+        shared = float(np.maximum(corners[1] - corners[0], 0.0).prod())
+        after = min(row + 1, len(other.times) - 1)
+        mine, his = (float((box[2:] - box[:2]).prod()) for box in (one.boxes[0], other.boxes[after]))
+        if mine >= _PIECE * his and shared >= share * max(mine, _MOMENT):
+            best, share = other, shared / max(mine, _MOMENT)
+    return best
+
+
+def _led_by(one: _Path, other: _Path) -> _Path:
+    """A path that begins earlier, beside that of another."""
+    begin = one.times[0]
+    rows = np.flatnonzero((other.times < begin - _MOMENT) & (other.times >= begin - _WITH - _MOMENT))
+    beside = one.points[0] - other.points[rows[-1]]
+    return dataclasses.replace(
+        one,
+        frames=np.concatenate([other.frames[rows], one.frames]),
+        times=np.concatenate([other.times[rows], one.times]),
+        points=np.concatenate([other.points[rows] + beside, one.points]),
+        boxes=np.concatenate([other.boxes[rows], one.boxes]),
+        ground_speeds=np.concatenate([other.ground_speeds[rows], one.ground_speeds]),
+    )
 
 
 def _places(tracks: Tracks, point: str, size: tuple[int, int] | None) -> Float:
