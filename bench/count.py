@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from pages import Marks
 from regions import Table, chosen, markdown, plain
 
 from perdure import fold
@@ -35,7 +36,7 @@ CLIP = "cdnet-highway"
 SEEN = ROOT / "bench" / "count" / f"{CLIP}.csv"
 LINES = (Line("far", ((60, 130), (268, 130))), Line("near", ((20, 170), (272, 170))))
 PAGE = ROOT / "docs" / "counting.md"
-BEGIN, END = "<!-- bench/count.py begins -->", "<!-- bench/count.py ends -->"
+MARKS = Marks.of("bench/count.py", PAGE)
 APART = 12  # frames
 
 
@@ -165,10 +166,8 @@ def table(told: Sequence[Told]) -> Table:
 
 def replaced(text: str, told: Sequence[Told]) -> str:
     """Return the page with the table in the place of the last one."""
-    before, rest = text.split(BEGIN)
-    _, after = rest.split(END)
     command = " ".join(["python bench/count.py", *sys.argv[1:]])
-    return f"{before}{BEGIN}\n`{command}`\n\n{markdown(table(told))}\n{END}{after}"
+    return MARKS.replaced(text, f"`{command}`\n\n{markdown(table(told))}")
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pages import Marks
 from regions import Table, chosen, markdown, plain
 
 from perdure import fold
@@ -42,7 +43,7 @@ ROOT = Path(__file__).resolve().parents[1]
 CLIP = "pets09-s2l1"
 ZONES = ROOT / "bench" / "zones" / f"{CLIP}.json"
 PAGE = ROOT / "docs" / "zones.md"
-BEGIN, END = "<!-- bench/zones.py begins -->", "<!-- bench/zones.py ends -->"
+MARKS = Marks.of("bench/zones.py", PAGE)
 REGIONS = {"background": None, "detections": "det/det.txt"}
 FIGURES = ("MOTA", "IDF1", "IDSW", "Frag")
 
@@ -166,10 +167,8 @@ def table(told: Sequence[Told]) -> Table:
 
 def replaced(text: str, told: Sequence[Told]) -> str:
     """Return the page with the table in the place of the last one."""
-    before, rest = text.split(BEGIN)
-    _, after = rest.split(END)
     command = " ".join(["python bench/zones.py", *sys.argv[1:]])
-    return f"{before}{BEGIN}\n`{command}`\n\n{markdown(table(told))}\n{END}{after}"
+    return MARKS.replaced(text, f"`{command}`\n\n{markdown(table(told))}")
 
 
 if __name__ == "__main__":
