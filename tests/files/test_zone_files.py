@@ -49,6 +49,19 @@ def test_what_is_written_is_read_again(tmp_path: Path):
     assert zones_of_json(zones_to_json(zones), 100, 60) == zones
 
 
+def test_a_ring_is_one_line_of_the_file(tmp_path: Path):
+    write_zones(
+        tmp_path / "zones.json", Zones((Zone("entry", "[1,\\n2]", rectangle(10, 10, 50, 40)),), (), (60, 100))
+    )
+    lines = (tmp_path / "zones.json").read_text().splitlines()
+    assert sum(line.strip() == "[[10, 10], [50, 10], [50, 40], [10, 40], [10, 10]]" for line in lines) == 1
+    assert read_zones(tmp_path / "zones.json").zones[0].name == "[1,\\n2]"
+
+
+def test_a_file_without_a_zone_is_refused(tmp_path: Path):
+    assert "holds no zone" in refused(collection(), tmp_path)
+
+
 def test_a_ring_need_not_be_closed_and_foreign_properties_stay_out(tmp_path: Path):
     file = tmp_path / "zones.json"
     file.write_text(json.dumps(collection(feature(ring=SQUARE[:-1], stroke="#f00", id=7))))

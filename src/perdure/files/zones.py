@@ -14,6 +14,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -66,9 +67,12 @@ def read_zones(path: str | Path, width: int = 0, height: int = 0) -> Zones:
         line = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise FormatError(f"{path}{line}: not JSON ({why_not_json(error)})") from None
     try:
-        return zones_of_json(written, width, height)
+        zones = zones_of_json(written, width, height)
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from None
+    if not zones.zones:
+        raise FormatError(f'{path} holds no zone; put one into "features", or leave the file out')
+    return zones
 
 
 def write_zones(path: Path, zones: Zones, reasons: Mapping[str, str] | None = None) -> None:
@@ -81,8 +85,14 @@ def write_zones(path: Path, zones: Zones, reasons: Mapping[str, str] | None = No
         if reasons and feature["properties"]["name"] in reasons:
             feature["properties"]["reason"] = reasons[feature["properties"]["name"]]
     with whole_file(path) as file:
-        json.dump(collection, file, indent=1, ensure_ascii=False)
-        file.write("\n")
+        file.write(_rings_in_lines(json.dumps(collection, indent=1, ensure_ascii=False)) + "\n")
+
+
+def _rings_in_lines(written: str) -> str:
+    """Indented JSON with every list of numbers, and every list of such lists, in one line: a ring a line."""
+    written = re.sub(r"\[\s*\n([^\[\]{}\"]*)\n\s*\]", lambda one: f"[{' '.join(one[1].split())}]", written)
+    several = r"\[\s*\n((?:\s*\[[-0-9.eE+, ]*\],?)+)\s*\n\s*\]"
+    return re.sub(several, lambda one: f"[{' '.join(one[1].split())}]", written)
 
 
 def zones_to_json(zones: Zones) -> dict[str, Json]:
