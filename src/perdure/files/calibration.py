@@ -192,6 +192,11 @@ def _lens(camera: Mapping[str, Json], size: tuple[int, int]) -> Lens:
     if min(focal) <= 0:
         raise ValueError(f"focal = {value} must be above 0 pixels")
     centre = _vector(camera["centre"], "centre", 2) if "centre" in camera else [size[0] / 2, size[1] / 2]
+    if not (0 <= centre[0] <= size[0] and 0 <= centre[1] <= size[1]):
+        raise ValueError(
+            f"centre = [{centre[0]:g}, {centre[1]:g}] lies outside the picture of {size[0]}x{size[1]}; it is where the "
+            "camera looks straight ahead, in pixels of this picture, and near its middle"
+        )
     bend = camera.get("distortion", {})
     if isinstance(bend, list):
         if not 1 <= len(bend) <= 5:
