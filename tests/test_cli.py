@@ -100,6 +100,8 @@ def test_events_are_a_table_with_frames_and_times(place: Path):
     entered = [row for row in rows if row["kind"] == "entered"]
     assert sorted(row["ids"] for row in entered) == ["1", "2"]
     assert all(float(row["begin_time"]) == pytest.approx(int(row["begin_frame"]) / 10) for row in rows)
+    frames = [int(row["begin_frame"]) for row in rows]
+    assert frames == sorted(frames)
 
 
 def test_the_film_has_every_frame_in_vp9(place: Path):

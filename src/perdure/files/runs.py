@@ -195,18 +195,19 @@ class RunFolder:
                 write_rows(tracks, counted)
                 rows += len(counted)
                 ids.update(counted.ids.tolist())
+            table.write()
         return Totals(rows, len(ids), table.count)
 
 
 class _EventTable:
-    """`events.csv`, written while the entries of a log pass by."""
+    """`events.csv`, gathered while the entries of a log pass by, and written in the order in which the events began."""
 
     def __init__(self, file: IO[str], corrections: Corrections) -> None:
         self.count = 0
         self._corrections = corrections
         self._clock = _Clock()
         self._table = csv.writer(file, lineterminator="\n")
-        self._table.writerow(EVENT_COLUMNS)
+        self._events: list[Event] = []
 
     def passing(self, entries: Iterable[Entry]) -> Iterator[Report]:
         for number, entry in enumerate(entries):
@@ -214,9 +215,15 @@ class _EventTable:
             for event in entry.report.events:
                 settled = self._corrections.event(event, number)
                 if settled.ids or not event.ids:
-                    self._table.writerow(_event_row(settled, self._clock))
+                    self._events.append(settled)
                     self.count += 1
             yield entry.report
+
+    def write(self) -> None:
+        """Write the table; of events that began in one frame, as they were told."""
+        self._table.writerow(EVENT_COLUMNS)
+        for event in sorted(self._events, key=lambda one: one.begin):
+            self._table.writerow(_event_row(event, self._clock))
 
 
 class _Clock:
