@@ -320,6 +320,13 @@ def test_believed_silhouettes_instead_of_the_pixels_seen(
     assert (refused.code, "--believed" in refused.stderr) == (2, True)
 
 
+def test_who_asks_for_what_is_believed_hears_that_nothing_is(export: Callable[..., Done], tmp_path: Path):
+    rows = Tracks.of(frames=0, times=0.0, ids=[1], boxes=[[3, 2, 17, 18]], masks=[disc(10, 4)])
+    write_run(tmp_path / "run", {0: Report(rows), -1: Report()})
+    done = export("run", "--format", "mots", "-o", "out.txt", "--believed")
+    assert (done.code, "--believed changes nothing" in done.stderr) == (0, True)
+
+
 @pytest.mark.parametrize("form", ["geojson", "contour-csv", "svg"])
 def test_contours_appear_whole_or_not_at_all(
     export: Callable[..., Done], contours: Path, tmp_path: Path, form: str

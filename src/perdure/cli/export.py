@@ -109,6 +109,11 @@ def export(
         written = _write_text(output, folder, reporting, format_, believed=believed)
     if written.left_out:
         print(f"perdure: note: rows left out, without a silhouette: {written.left_out}", file=sys.stderr)
+    if believed and not any(one is not None for _, rows in _counted(folder, reporting) for one in rows.believed):
+        print(
+            "perdure: note: --believed changes nothing: this run says only what was seen; trackcut and contour believe whole ones",
+            file=sys.stderr,
+        )
     if json_:
         pictures = {} if written.frames is None else {"frames": written.frames}
         print(json.dumps({"output": str(output), "rows": written.rows, **pictures}))
