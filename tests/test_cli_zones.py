@@ -108,6 +108,17 @@ def test_the_film_shows_outlines_and_names():
     assert np.array_equal(paint(Frame(0, 0.0, image), *nothing, zoned), picture)
 
 
+def test_an_id_stands_beside_the_name_of_a_zone_where_there_is_room():
+    zone = Zone("entry", "here", rectangle(100, 100, 200, 180))
+    rows = Tracks.of(frames=0, times=0.0, ids=[1], boxes=[[100, 100, 130, 180]])
+    image = np.full((240, 320, 3), 90, np.uint8)
+    alone = paint(Frame(0, 0.0, image), Tracks.empty(), Trails.empty(), Scene(320, 240, zones=(zone,)))
+    both = paint(Frame(0, 0.0, image), rows, Trails.empty(), Scene(320, 240, zones=(zone,)))
+    name = (slice(80, 94), slice(106, 150))
+    assert (alone[name] != 90).any()
+    assert np.array_equal(alone[name], both[name]), "the name can still be read"
+
+
 def test_an_exit_over_an_entry_leaves_both_to_be_seen():
     both = tuple(Zone(kind, kind, rectangle(50, 50, 150, 150)) for kind in ("exit", "entry"))
     picture = paint(

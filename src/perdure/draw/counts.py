@@ -74,18 +74,27 @@ def _panel(title: str, curves: Sequence[_Curve], begin: float, end: float) -> Im
     cv2.line(picture, place(begin, 0), place(begin, highest), _INK, 1)
     _write(picture, "seconds", (WIDTH // 2, PANEL - 12), middle=True)
     _write(picture, title, (_LEFT, 28))
-    x = _LEFT + 220
+    x, y = _LEFT + 220, 28
     for number, curve in enumerate(curves):
         colour = _COLOURS[number % len(_COLOURS)]
         if len(curve.times):
             corners = [place(time, value) for time, value in _steps(curve)]
-            cv2.polylines(picture, [np.array(corners, np.int32)], False, colour, 2, cv2.LINE_AA)
+            cv2.polylines(
+                picture, [np.array(corners, np.int32)], False, colour, _width_of(number, len(curves)), cv2.LINE_AA
+            )
         width = _width(curve.name) + 60
-        if x + width <= WIDTH - _RIGHT:  # a legend as far as there is room for it
-            cv2.line(picture, (x, 22), (x + 26, 22), colour, 4)
-            _write(picture, curve.name, (x + 34, 28))
+        if x + width > WIDTH - _RIGHT:
+            x, y = _LEFT + 220, y + 20
+        if x + width <= WIDTH - _RIGHT and y < _TOP:  # a legend as far as there is room for it
+            cv2.line(picture, (x, y - 6), (x + 26, y - 6), colour, 4)
+            _write(picture, curve.name, (x + 34, y))
             x += width
     return picture
+
+
+def _width_of(number: int, count: int) -> int:
+    """How wide a curve is drawn, px: the first ones wider, so that those drawn over them do not hide them."""
+    return min(2 + 3 * (count - 1 - number), 11)
 
 
 def _steps(curve: _Curve) -> list[tuple[float, int]]:

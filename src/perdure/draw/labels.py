@@ -28,12 +28,20 @@ class Label(NamedTuple):
     gap: int
 
 
-def lay_labels(picture: Image, clock: str, labels: Sequence[Label], size: int, *, title: str = "") -> None:
+def lay_labels(
+    picture: Image,
+    clock: str,
+    labels: Sequence[Label],
+    size: int,
+    *,
+    title: str = "",
+    beside: Sequence[Place] = (),
+) -> None:
     """Write the clock into the lower left corner, a title into the upper, and each label at its box, in order.
 
-    What is larger than the picture allows is left out. `size` is the height of the letters in pixels.
+    None covers the places `beside`, if there is room elsewhere. What is larger than the picture allows is left out. `size` is the height of the letters in pixels.
     """
-    taken: list[Place] = []
+    taken: list[Place] = list(beside)
     margin = size // 3
     for text, top in ((title, True), (clock, False)):
         chip = _chip(text or " ", DARK, LIGHT, max(10, round(size * 0.85)))

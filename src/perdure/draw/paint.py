@@ -76,8 +76,7 @@ def paint(
     looks = _looks(seen, style)
     silhouettes = _silhouettes(seen, looks, style, height, width) if masks else []
     dashed = _believed_contours(seen, looks, style, height, width) if masks else []
-    if scene.zones:
-        draw_zones(picture, scene, style)
+    names = draw_zones(picture, scene, style) if scene.zones else ()
     if masks:
         _fill_masks(picture, seen)
     if frame.image is None:
@@ -93,7 +92,7 @@ def paint(
         cv2.polylines(picture, stroke.lines, False, stroke.colour, stroke.width, cv2.LINE_AA)
     labels = [*_labels(seen, looks, style), *mark_labels(marks or (), style, height, width)]
     title = "" if marks is None else LEGEND
-    lay_labels(picture, f"{frame.index}   {frame.time:.2f} s", labels, style.letters, title=title)
+    lay_labels(picture, f"{frame.index}   {frame.time:.2f} s", labels, style.letters, title=title, beside=names)
     return picture
 
 

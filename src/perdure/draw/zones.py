@@ -24,8 +24,8 @@ _SHARE = 0.75  # of a chip, against what is under it
 _FAR = 16000  # cv2 counts lines in 16 bits
 
 
-def draw_zones(picture: Image, scene: Scene, style: Style) -> None:
-    """Draw the zones of a scene into a picture, whole outlines first."""
+def draw_zones(picture: Image, scene: Scene, style: Style) -> list[Place]:
+    """Draw the zones of a scene into a picture, whole outlines first; return where their names stand."""
     zones = sorted(scene.zones, key=lambda one: one.kind not in _WHOLE)
     band = np.zeros(picture.shape[:2], np.uint8)
     outlines = [_outlines(one.polygons) for one in zones]
@@ -47,6 +47,7 @@ def draw_zones(picture: Image, scene: Scene, style: Style) -> None:
         chip = free_chip(label, taken, picture, max(10, round(0.8 * style.letters)))
         if chip is not None:
             taken.append(lay_chip(picture, *chip, _SHARE))
+    return taken
 
 
 def _outlines(polygons: tuple[tuple[tuple[tuple[float, float], ...], ...], ...]) -> Lines:
