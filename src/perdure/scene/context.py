@@ -111,7 +111,7 @@ class Context:
         if name not in self.levels:
             return similarity
         low, high = self.levels[name]
-        return np.clip((similarity - low) / (high - low), 0.0, 1.0)
+        return np.asarray(np.clip((similarity - low) / (high - low), 0.0, 1.0))
 
 
 class Nearest(NamedTuple):
