@@ -15,7 +15,7 @@ from worlds import two_apart
 
 import perdure
 from perdure.cli.main import run as run_command
-from perdure.cli.score import spread
+from perdure.cli.spreading import spread
 from perdure.comparison import Window, read_window
 from perdure.draw import Trails, paint
 from perdure.draw.marks import Mark
@@ -230,7 +230,7 @@ def test_numbers_that_do_not_pair_are_refused(tmp_path, perdure_says):
 def test_the_truth_may_stand_first(tmp_path, truth, perdure_says):
     write_run(tmp_path / "run", WORLD.truth())
     assert perdure_says("score", "--truth", truth, "run", "--json").figures()["MOTA"] == 1.0
-    assert spread(["--json", "--truth", "a", "b", "--masks"]) == [
+    assert spread(["--json", "--truth", "a", "b", "--masks"], ("--truth",)) == [
         "--json",
         "--truth",
         "a",

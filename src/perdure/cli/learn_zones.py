@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Optional
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from perdure.cli import options
+from perdure.cli.pictures import new_picture
 from perdure.detect.occluders import no_passages, note, occluders
 from perdure.errors import FormatError, OutputError, ParameterError, PerdureError
 from perdure.files.log import read_log
 from perdure.files.runs import PARTS, RunFolder
 from perdure.files.video import Source, open_source
-from perdure.files.whole import cannot_write, refuse_existing
+from perdure.files.whole import refuse_existing
 from perdure.files.zones import write_zones
 from perdure.scene.learning import Learnt, Standing, learn_zones
 from perdure.scene.zones import Zones
@@ -77,7 +75,7 @@ def learn(
         raise PerdureError(f"{run} tells of no zone ({why}); track a longer film, or draw the zones yourself")
     zones = Zones(tuple(one.zone for one in learnt.proposals), (), size)
     told = {one.zone.name: one.reason for one in learnt.proposals}
-    with _new_picture(picture, _drawn(zones, looks)):
+    with new_picture(picture, _drawn(zones, looks)):
         write_zones(output, zones, told)
     if json_:
         print(json.dumps(_as_json(learnt, output, picture)))
@@ -224,25 +222,6 @@ def _drawn(zones: Zones, looks: Sequence[Frame]) -> Image:
     height, width = zones.size
     frame = looks[len(looks) // 2] if looks else Frame(0, 0.0, None)
     return paint(frame, Tracks.empty(), Trails.empty(), Scene(width, height, zones=zones.zones))
-
-
-@contextlib.contextmanager
-def _new_picture(path: Path, picture: Image) -> Iterator[None]:
-    """Write a PNG beside its place; it takes its name if nothing goes wrong in between."""
-    import cv2
-
-    part = path.with_name(f".{path.name}.part")
-    try:
-        encoded: NDArray[np.uint8] = cv2.imencode(".png", np.ascontiguousarray(picture[..., ::-1]))[1]
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(encoded.tobytes())
-        yield
-        os.replace(part, path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 def _as_json(learnt: Learnt, output: Path, picture: Path) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typer.core import TyperCommand
 
 from perdure import params
 from perdure.cli import options, tables
+from perdure.cli.spreading import spread
 from perdure.comparison import Comparison, Wanted, compare_files, read_window
 from perdure.errors import ParameterError, PerdureError
 from perdure.files.mot import PROTOCOLS
@@ -38,24 +39,7 @@ class ScoreCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put `--truth` before every one of its words, then parse as usual."""
-        return list(super().parse_args(ctx, spread(args)))
-
-
-def spread(words: Sequence[str]) -> list[str]:
-    """Return a command line in which `--truth` stands before each of its paths.
-
-    >>> spread(["run", "--truth", "a", "b", "--json"])
-    ['run', '--truth', 'a', '--truth', 'b', '--json']
-    """
-    found: list[str] = []
-    of_truth = False
-    for word in words:
-        if word.startswith("-"):
-            of_truth = word == "--truth"
-            found += [] if of_truth else [word]
-        else:
-            found += ["--truth", word] if of_truth else [word]
-    return found
+        return list(super().parse_args(ctx, spread(args, ("--truth",))))
 
 
 @options.with_parameters(("", {"What counts": Reporting}))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,18 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.draw.colours import Colour
+from perdure.draw.chart import COLOURS, GRID, INK, PAPER, ticks, width_of, write
 from perdure.scene.counting import IN, OUT, Counts
 from perdure.types import Image
 
 WIDTH, PANEL = 1200, 360  # px
 _LEFT, _RIGHT, _TOP, _BOTTOM = 80, 30, 52, 60  # px round a panel's axes
-_PAPER: Colour = (255, 255, 255)
-_INK: Colour = (40, 42, 48)
-_GRID: Colour = (222, 224, 228)
-_COLOURS: tuple[Colour, ...] = (  # told apart by who sees colours badly, too (Okabe and Ito)
-    (0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (86, 180, 233), (230, 159, 0),
-)  # fmt: skip
 
 
 class _Curve(NamedTuple):
@@ -56,7 +49,7 @@ def _cumulative(name: str, moments: Sequence[float], begin: float, end: float) -
 
 
 def _panel(title: str, curves: Sequence[_Curve], begin: float, end: float) -> Image:
-    picture = np.full((PANEL, WIDTH, 3), _PAPER, np.uint8)
+    picture = np.full((PANEL, WIDTH, 3), PAPER, np.uint8)
     highest = max([1, *(int(curve.values.max()) for curve in curves if len(curve.values))])
     span = max(end - begin, 1e-9)
     wide, high = WIDTH - _LEFT - _RIGHT, PANEL - _TOP - _BOTTOM
@@ -64,30 +57,30 @@ def _panel(title: str, curves: Sequence[_Curve], begin: float, end: float) -> Im
     def place(time: float, value: float) -> tuple[int, int]:
         return round(_LEFT + wide * (time - begin) / span), round(_TOP + high * (1 - value / highest))
 
-    for value in _ticks(0, highest, 5, least=1):
-        cv2.line(picture, place(begin, value), place(end, value), _GRID, 1)
-        _write(picture, f"{value:g}", (_LEFT - 10, place(begin, value)[1] + 6), right=True)
-    for time in _ticks(begin, end, 10):
-        cv2.line(picture, place(time, 0), place(time, highest), _GRID, 1)
-        _write(picture, f"{time:g}", (place(time, 0)[0], PANEL - _BOTTOM + 22), middle=True)
-    cv2.line(picture, place(begin, 0), place(end, 0), _INK, 1)
-    cv2.line(picture, place(begin, 0), place(begin, highest), _INK, 1)
-    _write(picture, "seconds", (WIDTH // 2, PANEL - 12), middle=True)
-    _write(picture, title, (_LEFT, 28))
+    for value in ticks(0, highest, 5, least=1):
+        cv2.line(picture, place(begin, value), place(end, value), GRID, 1)
+        write(picture, f"{value:g}", (_LEFT - 10, place(begin, value)[1] + 6), right=True)
+    for time in ticks(begin, end, 10):
+        cv2.line(picture, place(time, 0), place(time, highest), GRID, 1)
+        write(picture, f"{time:g}", (place(time, 0)[0], PANEL - _BOTTOM + 22), middle=True)
+    cv2.line(picture, place(begin, 0), place(end, 0), INK, 1)
+    cv2.line(picture, place(begin, 0), place(begin, highest), INK, 1)
+    write(picture, "seconds", (WIDTH // 2, PANEL - 12), middle=True)
+    write(picture, title, (_LEFT, 28))
     x, y = _LEFT + 220, 28
     for number, curve in enumerate(curves):
-        colour = _COLOURS[number % len(_COLOURS)]
+        colour = COLOURS[number % len(COLOURS)]
         if len(curve.times):
             corners = [place(time, value) for time, value in _steps(curve)]
             cv2.polylines(
                 picture, [np.array(corners, np.int32)], False, colour, _width_of(number, len(curves)), cv2.LINE_AA
             )
-        width = _width(curve.name) + 60
+        width = width_of(curve.name) + 60
         if x + width > WIDTH - _RIGHT:
             x, y = _LEFT + 220, y + 20
         if x + width <= WIDTH - _RIGHT and y < _TOP:  # a legend as far as there is room for it
             cv2.line(picture, (x, y - 6), (x + 26, y - 6), colour, 4)
-            _write(picture, curve.name, (x + 34, y))
+            write(picture, curve.name, (x + 34, y))
             x += width
     return picture
 
@@ -105,28 +98,3 @@ def _steps(curve: _Curve) -> list[tuple[float, int]]:
         if values[k] != values[k - 1] or k == len(values) - 1:
             corners += [(float(curve.times[k]), values[k - 1]), (float(curve.times[k]), values[k])]
     return corners
-
-
-def _ticks(low: float, high: float, about: int, least: float = 0.0) -> list[float]:
-    """Round numbers from low to high, some `about` of them."""
-    rough = max((high - low) / about, least, 1e-9)
-    unit = 10.0 ** math.floor(math.log10(rough) + 1e-9)
-    step = next(unit * times for times in (1, 2, 5, 10) if unit * times >= rough * (1 - 1e-9))
-    return [round(k * step, 9) for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
-
-
-def _write(
-    picture: Image, text: str, place: tuple[int, int], *, right: bool = False, middle: bool = False
-) -> None:
-    x, y = place
-    x -= _width(text) if right else _width(text) // 2 if middle else 0
-    cv2.putText(picture, _plain(text), (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.55, _INK, 1, cv2.LINE_AA)
-
-
-def _width(text: str) -> int:
-    return int(cv2.getTextSize(_plain(text), cv2.FONT_HERSHEY_SIMPLEX, 0.55, 1)[0][0])
-
-
-def _plain(text: str) -> str:
-    """Letters that are there to draw with."""
-    return text.encode("ascii", "replace").decode()
