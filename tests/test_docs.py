@@ -9,6 +9,7 @@ import pytest
 
 from perdure import params
 from perdure.detect import DETECTORS
+from perdure.learn import Learning
 from perdure.trackers import TRACKERS
 
 ROOT = Path(__file__).parents[1]
@@ -30,7 +31,7 @@ def test_every_option_that_the_documents_name_exists():
     }
     declared = {
         one.name.replace("_", "-")
-        for kind in (*TRACKERS.values(), *DETECTORS.values())
+        for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning)
         for one in params.describe(kind)
     }
     programs = [*(ROOT / "src/perdure/cli").glob("*.py"), *(ROOT / "bench").glob("*.py")]

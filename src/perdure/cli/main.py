@@ -12,12 +12,14 @@ import typer
 
 from perdure import __version__
 from perdure.cli.calibrate import calibrate
+from perdure.cli.context import context
 from perdure.cli.count import count
 from perdure.cli.demo import demo
 from perdure.cli.detect import detect
 from perdure.cli.draw import draw
 from perdure.cli.export import export
-from perdure.cli.learn_zones import learn
+from perdure.cli.learn import LearnCommand, learn
+from perdure.cli.learn_zones import learn as learn_zones
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
 from perdure.cli.warmup import warmup
@@ -48,9 +50,10 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, detect, draw, export, count, calibrate, demo, warmup):
+for command in (track, detect, draw, export, count, calibrate, context, demo, warmup):
     app.command()(_interruptible(command))
-app.command("learn-zones")(_interruptible(learn))
+app.command(cls=LearnCommand)(_interruptible(learn))
+app.command("learn-zones")(_interruptible(learn_zones))
 app.command(cls=ScoreCommand)(_interruptible(score))
 
 
