@@ -40,7 +40,7 @@ Float = NDArray[np.float64]
 Bits = NDArray[np.bool_]
 NEAR = "displacement_2d"  # the feature that gates pairs
 LEAST_OVERLAP = 0.5  # of a detection with the truth that it is
-SPREAD = (0.25, 0.75)  # quantiles: levels are that of different pairs and that of same ones
+SPREAD = (0.05, 0.95)  # quantiles: levels are that of different pairs and that of same ones
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
