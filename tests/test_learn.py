@@ -157,6 +157,16 @@ def test_a_feature_weighs_by_how_much_it_tells_and_levels_are_usual_similarities
     assert context.training.separation > context.training.alone["area"].separation - 0.02
 
 
+def test_what_weighs_little_is_left_out():
+    samples = drawn(np.random.default_rng(2))
+    every = context_of(samples, Learning(least_weight=0.0), "x").context.weights
+    least = sorted(every.values())[-2]
+    few = context_of(samples, Learning(least_weight=min(least, 0.5)), "x").context.weights
+    assert set(few) == {name for name, weight in every.items() if weight >= least}
+    assert sum(few.values()) == pytest.approx(1.0)
+    assert set(context_of(samples, Learning(rounds=1, least_weight=0.5), "x").context.weights) == {"area"}
+
+
 def test_balance_and_the_paper_differ_where_most_pairs_are_different():
     rng = np.random.default_rng(5)
     samples = drawn(rng)

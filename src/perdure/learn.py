@@ -67,11 +67,14 @@ class Learning:
     )  # fmt: skip
     balanced: bool = parameter(True, "same and different pairs weigh the same on the whole")
     levels: bool = parameter(True, "similarities count between those usual for different and for same pairs")
+    least_weight: float = parameter(
+        0.05, "a feature that would weigh less is left out, and need not be computed", low=0.0, high=0.5
+    )
     least_score: float = parameter(0.0, "detections of a lower score are left out", low=0.0, high=1.0)
     most: int = parameter(100_000, "pairs that are kept, half of them same ones", low=100, high=10_000_000)
 
 
-PAPER = Learning(similar=0.5, gap=0.0, gated=False, carried=0.0, balanced=False, levels=False)
+PAPER = Learning(similar=0.5, gap=0.0, gated=False, carried=0.0, balanced=False, levels=False, least_weight=0.0)
 
 
 class Film(NamedTuple):
@@ -135,7 +138,9 @@ def context_of(samples: Samples, learning: Learning, name: str) -> Learnt:
     """Learn a context from samples, of which some are of the same object."""
     boosted, notes = _boosted(samples, learning)
     names = tuple(POOL)
-    weights = {one: float(weight) for one, weight in zip(names, boosted.weights, strict=True) if weight > 0}
+    heavy = boosted.weights >= min(max(learning.least_weight, 1e-12), float(boosted.weights.max()))
+    rest = np.where(heavy, boosted.weights, 0.0) / boosted.weights[heavy].sum()
+    weights = {one: float(weight) for one, weight in zip(names, rest, strict=True) if weight > 0}
     levels = _levels(samples, weights) if learning.levels else {}
     context = Context(name, weights, levels=levels)
     link, told = link_similarity(context, samples)
