@@ -4,7 +4,8 @@
 
 Sequences: MOT17-02 and MOT17-04 with two sets of detections (no pictures), and pets09-s2l1 with its pictures. The first
 table has the weights; the second, for each that is learnt from (down) and tested on (across), the mean over the others of
-1 - AUC, in percent, of the link similarity (eq. 10): with equal weights, displacement alone, as the paper learns, as we do.
+1 - AUC, in percent, of the link similarity (eq. 10): with equal weights, displacement alone, by the paper's
+rule from the same pairs (one threshold, no balance, no levels), as we learn.
 Of MOT17 neither set of detections of a sequence is tested on what was learnt from the other. --library writes the
 contexts that come with the package, into src/perdure/contexts. The data is read from $PERDURE_DATA or ../shared/data
 beside the repository.
