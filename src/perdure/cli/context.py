@@ -15,6 +15,7 @@ from perdure.cli import options
 from perdure.cli.progress import watched
 from perdure.cli.tables import aligned
 from perdure.detect import DETECTORS
+from perdure.errors import DamagedVideo
 from perdure.files.contexts import library, read_context
 from perdure.pipeline import plan
 from perdure.scene.context import Context, ranking
@@ -61,10 +62,13 @@ def context(
         parameters=options.read_parameters(parameters, chosen),
     ).prepared()
     state = begin()
+    lost: DamagedVideo | None = None
     try:
         frames = watched(made.source, f"measuring {made.source.name}", made.source.count)
         for frame, regions in made.seen(frames):
             state = measure(state, frame, regions, made.scene, math.inf)
+    except DamagedVideo as damage:
+        lost = damage  # what came before is measured
     finally:
         made.source.close()
         for note in (*made.source.warnings, *made.notes()):
@@ -72,6 +76,8 @@ def context(
     found = measures_of(state, made.scene)
     ranked = ranking(known, found)
     print(json.dumps(_value(source, found, ranked)) if json_ else _words(found, ranked))
+    if lost is not None:
+        raise lost
 
 
 def _value(source: str, found: Measures, ranked: list[tuple[Context, float]]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from perdure.cli.pictures import new_picture
 from perdure.cli.progress import watched
 from perdure.cli.spreading import spread
 from perdure.cli.tables import aligned
-from perdure.errors import FormatError, OutputError, ParameterError
+from perdure.errors import DamagedVideo, FormatError, OutputError, ParameterError
 from perdure.features.pool import POOL
 from perdure.files.contexts import context_to_json, write_context
 from perdure.files.scored import read_scored_truth
@@ -116,7 +116,8 @@ def learn(
     if not named:
         raise ParameterError("--name is empty; give a word or more")
     window = {"fps": fps, "start": start, "end": end, "calibration": calibration}
-    films = _films(sources, truth or [], detector or [], window)
+    lost: list[DamagedVideo] = []
+    films = _films(sources, truth or [], detector or [], window, lost)
     learnt = learn_from(films, learning, named)
     from perdure.draw.learnt import plot
 
@@ -127,12 +128,18 @@ def learn(
         print(json.dumps({**about, **context_to_json(learnt.context)}))
     else:
         print(_words(learnt, output, picture))
+    if lost:
+        raise lost[0]
 
 
 def _films(
-    sources: list[str], truths: list[Path], detectors: list[str], window: Mapping[str, Any]
+    sources: list[str],
+    truths: list[Path],
+    detectors: list[str],
+    window: Mapping[str, Any],
+    lost: list[DamagedVideo],
 ) -> Iterator[Film]:
-    """Check that all belong together; then yield each film when its turn comes."""
+    """Check that all belong together; then yield each film when its turn comes, damages into `lost`."""
     if len(truths) != len(sources):
         raise ParameterError(
             f"{len(sources)} sources and {len(truths)} truths; give one --truth for each source, in the same order"
@@ -147,7 +154,7 @@ def _films(
     given: Sequence[str | None] = detectors or [None]
     each = given if len(given) == len(sources) else [given[0]] * len(sources)
     return (
-        _film(source, path, rows, one, window)
+        _film(source, path, rows, one, window, lost)
         for source, path, rows, one in zip(sources, truths, known, each, strict=True)
     )
 
@@ -160,7 +167,9 @@ def _rows(path: Path) -> Rows:
     return rows
 
 
-def _film(source: str, path: Path, truth: Rows, detector: str | None, window: Mapping[str, Any]) -> Film:
+def _film(
+    source: str, path: Path, truth: Rows, detector: str | None, window: Mapping[str, Any], lost: list[DamagedVideo]
+) -> Film:
     """Open a source; without a detector the truth's own boxes stand for one, for the ground's sake."""
     own = (
         path if path.is_file() else next(one for one in (path / "gt" / "gt.txt", path / "gt.txt") if one.is_file())
@@ -170,6 +179,8 @@ def _film(source: str, path: Path, truth: Rows, detector: str | None, window: Ma
     def frames() -> Iterator[Frame]:
         try:
             yield from watched(made.source, f"learning from {made.source.name}", made.source.count)
+        except DamagedVideo as damage:
+            lost.append(damage)  # what came before is learnt from
         finally:
             made.source.close()
             for note in (*made.source.warnings, *(made.notes() if detector else ())):
