@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.appearance import look, signature
+from perdure.maths.jitter import Jitter
+from perdure.maths.jitter import learnt as surprised
 from perdure.params import parameter
 from perdure.scene.ground import Ground
 from perdure.scene.reach import within_reach
@@ -17,8 +19,6 @@ from perdure.trackers.compound.bodies import Bodies
 from perdure.trackers.compound.companies import Pair, accompany
 from perdure.trackers.compound.gathering import HIDDEN, Held, Sight, gather
 from perdure.trackers.compound.identity import Judge
-from perdure.trackers.compound.jitter import Jitter
-from perdure.trackers.compound.jitter import learnt as surprised
 from perdure.trackers.compound.matrix import Possible, Thresholds, match
 from perdure.trackers.compound.meetings import Compound as Record
 from perdure.trackers.compound.meetings import form, resolve
