@@ -21,6 +21,7 @@ from perdure.features.feature import Feature, Float
 from perdure.features.ground_displacement import GroundDisplacement
 from perdure.features.histogram import ColourHistogram
 from perdure.features.hog import HogPoints
+from perdure.features.overlap import Overlap
 from perdure.features.shape_ratio import ShapeRatio
 from perdure.params import unknown_name
 from perdure.types import Scene
@@ -34,6 +35,7 @@ POOL: Mapping[str, Callable[[Scene], Feature]] = {  # in the paper's order, k = 
     "hog": lambda scene: HogPoints(),
     "covariance": lambda scene: ColourCovariance(),
     "dominant": lambda scene: DominantColours(),
+    "overlap": lambda scene: Overlap(),
 }
 PAPER = tuple(POOL)[:8]
 EMBEDDING = "embedding"  # the ninth, there where a network is named
@@ -62,4 +64,4 @@ def made(names: Iterable[str], scene: Scene, network: Network | None = None) -> 
 
 def known(rows: Float) -> NDArray[np.bool_]:
     """Return of which rows (N, ...) of a feature something is known (N,): those that are not all zeros."""
-    return np.asarray(rows.reshape(len(rows), -1).any(axis=1))
+    return np.asarray(rows.any(axis=tuple(range(1, rows.ndim))))
