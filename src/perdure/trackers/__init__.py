@@ -6,6 +6,7 @@ from typing import Any
 
 from perdure.trackers.compound import Compound, CompoundState
 from perdure.trackers.contour import Contour, ContourState
+from perdure.trackers.multifeature import MultiFeature, MultiFeatureState
 from perdure.trackers.overlap import Overlap
 from perdure.trackers.trackcut import TrackCut, TrackCutState
 
@@ -15,6 +16,8 @@ __all__ = [
     "CompoundState",
     "Contour",
     "ContourState",
+    "MultiFeature",
+    "MultiFeatureState",
     "Overlap",
     "TrackCut",
     "TrackCutState",
@@ -22,6 +25,7 @@ __all__ = [
 
 TRACKERS: dict[str, type[Any]] = {  # of those that follow marks, the first is taken where none is named
     "compound": Compound,
+    "multifeature": MultiFeature,
     "overlap": Overlap,
     "trackcut": TrackCut,
     "contour": Contour,
