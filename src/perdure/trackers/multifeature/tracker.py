@@ -116,7 +116,7 @@ class MultiFeature:
         1.0, "gap up to which interpolated rows count as results", unit="s", low=0.0, high=3600.0
     )
     recall: float = parameter(
-        20.0,
+        10.0,
         "how long a target lost in the picture may be found again by its looks",
         unit="s",
         low=0.0,
