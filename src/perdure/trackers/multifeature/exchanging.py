@@ -24,6 +24,9 @@ from perdure.types import Boxes, Event, Frame, Renamed
 Index = NDArray[np.intp]
 _TOUCH = 0.1  # share of a box in another from which two meet
 _NEEDED, _ENOUGH = 2, 4  # looks after the meeting from which it is judged, and after which it is settled
+_MORE = 2.0  # nats by which an exchange must be likelier for each more that takes part
+_BORN = 0.3  # s before the meeting, from which one seen first may be who was lost in it
+_NEVER = 1e3  # nats against what cannot be
 _LONGEST = 12.0  # s after which a meeting is forgotten
 OWN = ("keys", "ids", "born", "first", "named", "entry")  # what belongs to the identity, not to the body
 
@@ -55,6 +58,7 @@ class Exchanged(NamedTuple):
 
     targets: Targets
     meetings: Meetings
+    keys: dict[int, int]  # of who has turned out to be whom, and had no id
     renamed: tuple[Renamed, ...]
     events: tuple[Event, ...]
 
@@ -99,84 +103,160 @@ def exchange(
     frame: Frame,
     sure: float,
 ) -> Exchanged:
-    """Judge the meetings of those of whom there is a `fresh` look; `sure` is the least log odds of an exchange."""
-    rows = {key: row for row, key in enumerate(targets.keys.tolist())}
-    new = set(targets.keys[fresh].tolist())
-    kept = frame.time - meetings.last <= _LONGEST
-    renamed: list[Renamed] = []
-    events: list[Event] = []
-    for number, (one, other) in enumerate(meetings.keys.tolist()):
-        if one not in rows or other not in rows:
-            kept[number] = False
-            continue
-        if not kept[number] or not ({one, other} & new) or not kinds:
-            continue
-        pair = np.array([rows[one], rows[other]])
-        odds, count = _odds(
-            kinds, telling, targets, pair, float(meetings.begin[number]), float(meetings.last[number])
-        )
-        if count >= _ENOUGH:
-            kept[number] = False
-        if odds < sure or not (targets.ids[pair] > 0).all():
-            continue
-        begin = int(meetings.nearest[number])
-        ids = [int(one) for one in targets.ids[pair]]
-        renamed += [Renamed(ids[0], ids[1], begin, frame.index), Renamed(ids[1], ids[0], begin, frame.index)]
-        events.append(
-            Event(
-                "exchanged",
-                begin,
-                frame.index,
-                tuple(ids),
-                why=f"by their looks before and after they met: log odds {odds:.1f}",
-            )
-        )
-        targets = _changed(targets, pair, float(meetings.begin[number]))
-        kept[number] = False
-    return Exchanged(targets, meetings.take(kept), tuple(renamed), tuple(events))
+    """Judge the meetings of those of whom there is a `fresh` look; `sure` is the least log odds of an exchange.
 
-
-def _odds(
-    kinds: Sequence[Feature], telling: Telling, targets: Targets, pair: Index, begin: float, end: float
-) -> tuple[float, int]:
-    """How much likelier it is that two have changed identities, in nats, and how many looks there are of it.
-
-    One of them may be lost: the other alone is then compared with both. -inf where too little was seen.
+    All who met, one by another, are judged together: three may have changed places in a ring. One of them may be lost,
+    and one may have been seen first when they parted: then it may be who was lost.
     """
-    when = targets.looked[pair]  # (2, E)
-    before, after = (when > NEVER) & (when < begin), when > end
-    counts = after.sum(axis=1)
-    lost = targets.missed[pair] > 0
-    if not before.any(axis=1).all() or (counts[~lost] < _NEEDED).any() or lost.all():
-        return -np.inf, 0
-    body, identity = (part.ravel() for part in np.meshgrid([0, 1], [0, 1], indexing="ij"))
-    seen = counts[body] > 0
-    body, identity = body[seen], identity[seen]
-    mine = {kind.name: targets.looks[kind.name][pair[identity]] for kind in kinds}
-    theirs = {kind.name: targets.looks[kind.name][pair[body]] for kind in kinds}
-    numbers = alike(kinds, mine, before[identity], theirs, after[body]).astype(np.float64)
-    odds = log_odds(telling.same, telling.other, numbers)
-    return float(odds[body != identity].sum() - odds[body == identity].sum()), int(counts[~lost].min())
+    rows = {key: row for row, key in enumerate(targets.keys.tolist())}
+    there = np.array([one in rows and other in rows for one, other in meetings.keys.tolist()], np.bool_)
+    meetings = meetings.take(there & (frame.time - meetings.last <= _LONGEST)) if len(there) else meetings
+    found = Exchanged(targets, meetings, {}, (), ())
+    if not kinds or not len(meetings.keys):
+        return found
+    new = set(targets.keys[fresh].tolist())
+    for company in _companies(meetings.keys):
+        if new & set(company):
+            members = np.array([rows[key] for key in company])
+            found = _judged(kinds, telling, found, members, frame, sure)
+    return found._replace(meetings=_unsettled(found.targets, found.meetings))
 
 
-def _changed(targets: Targets, pair: Index, begin: float) -> Targets:
-    """The targets, of which two have changed identities: looks since `begin` stay with the bodies."""
-    back = pair[::-1]
-    columns: dict[str, NDArray[Any]] = {}
-    for name in OWN:
-        columns[name] = getattr(targets, name).copy()
-        columns[name][pair] = columns[name][back]
-    before = targets.looked[pair] < begin  # (2, E)
+class _Company(NamedTuple):
+    """Who may have changed places."""
+
+    bodies: Index  # (B,) rows of targets that are seen, and were by themselves since
+    identities: Index  # (I,) rows of targets whose looks are known from before
+    odds: NDArray[np.float64]  # (I, B) how likely each is each, in nats; -inf where it cannot be
+    own: NDArray[np.float64]  # (B,) the same of each body and its present identity
+
+
+def _judged(
+    kinds: Sequence[Feature], telling: Telling, found: Exchanged, members: Index, frame: Frame, sure: float
+) -> Exchanged:
+    """Give the identities of a company to the bodies which they fit best, if that is likelier by far than as it is."""
+    targets = found.targets
+    spans = _spans(targets, found.meetings, members)
+    company = _likely(kinds, telling, targets, members, spans)
+    if len(company.bodies) == 0 or len(members) < 2:
+        return found
+    from scipy.optimize import linear_sum_assignment  # half a second to load
+
+    identity, body = linear_sum_assignment(
+        np.where(np.isfinite(company.odds), company.odds, -_NEVER), maximize=True
+    )
+    chosen = dict(zip(company.bodies[body].tolist(), company.identities[identity].tolist(), strict=True))
+    changed = {one: other for one, other in chosen.items() if one != other}
+    gain = float(company.odds[identity, body].sum() - company.own.sum())
+    if len(chosen) < len(company.bodies) or not changed or gain < sure + _MORE * (len(changed) - 1):
+        return found
+    return _given(found, changed, spans, members, frame, gain)
+
+
+def _likely(
+    kinds: Sequence[Feature], telling: Telling, targets: Targets, members: Index, spans: _Spans
+) -> _Company:
+    """How likely each identity is each body, by looks before and after."""
+    when = targets.looked[members]  # (M, E)
+    before = (when > NEVER) & (when < spans.begin[:, None])
+    after = when > spans.end[:, None]
+    seen = targets.missed[members] == 0
+    ready = seen & (after.sum(axis=1) >= _NEEDED)
+    newborn = ready & ~before.any(axis=1) & (targets.born[members] >= spans.begin - _BORN)
+    known = before.any(axis=1) & (ready | ~seen)
+    ready &= known | newborn
+    bodies, identities = np.flatnonzero(ready), np.flatnonzero(known | newborn)
+    odds = np.full((len(identities), len(bodies)), -np.inf)
+    odds[identities[:, None] == bodies] = 0.0  # of one seen first when they parted nothing is known
+    one, other = (
+        part.ravel()
+        for part in np.meshgrid(np.flatnonzero(known[identities]), np.arange(len(bodies)), indexing="ij")
+    )
+    if len(one):
+        mine, theirs = identities[one], bodies[other]
+        looks = [{kind.name: targets.looks[kind.name][members[part]] for kind in kinds} for part in (mine, theirs)]
+        numbers = alike(kinds, looks[0], before[mine], looks[1], after[theirs]).astype(np.float64)
+        odds[one, other] = log_odds(telling.same, telling.other, numbers)
+    own = np.array([odds[identities == body, number].sum() for number, body in enumerate(bodies.tolist())])
+    return _Company(members[bodies], members[identities], odds, own)
+
+
+class _Spans(NamedTuple):
+    """When each member (M,) of a company was not by itself."""
+
+    begin: NDArray[np.float64]  # s
+    end: NDArray[np.float64]  # s
+    nearest: NDArray[np.int64]  # the frame in which it was nearest to another
+
+
+def _spans(targets: Targets, meetings: Meetings, members: Index) -> _Spans:
+    mine = (meetings.keys[:, :, None] == targets.keys[members]).any(axis=1)  # (C, M)
+    begin = np.where(mine, meetings.begin[:, None], np.inf).min(axis=0)
+    end = np.where(mine, meetings.last[:, None], -np.inf).max(axis=0)
+    most = np.where(mine, meetings.overlap[:, None], -1.0).argmax(axis=0)
+    return _Spans(begin, end, meetings.nearest[most])
+
+
+def _given(
+    found: Exchanged, changed: dict[int, int], spans: _Spans, members: Index, frame: Frame, gain: float
+) -> Exchanged:
+    """The targets, whose bodies have the identities `changed` gives them, body to identity."""
+    targets = found.targets
+    at = {row: number for number, row in enumerate(members.tolist())}
+    freed = sorted(set(changed) - set(changed.values()))  # identities without a body: they go to who is lost
+    sources = {**changed, **dict(zip(sorted(set(changed.values()) - set(changed)), freed, strict=True))}
+    renamed, keys, events = list(found.renamed), dict(found.keys), list(found.events)
+    for body, identity in changed.items():
+        begin = int(spans.nearest[at[body]])
+        fresh = bool(targets.first[body] >= begin)
+        old, new = int(targets.ids[body]), int(targets.ids[identity])
+        if old > 0 and new > 0:
+            renamed.append(Renamed(old, new, int(targets.first[body]) if fresh else begin, frame.index))
+        elif old == 0:
+            keys[int(targets.keys[body])] = int(targets.keys[identity])
+    begin = min(int(spans.nearest[at[body]]) for body in changed)
+    ids = tuple(sorted({int(targets.ids[row]) for row in sources if targets.ids[row] > 0}))
+    why = f"by their looks before and after they met: log odds {gain:.1f}"
+    events.append(Event("exchanged", begin, frame.index, ids, why=why))
+    after = _moved(targets, sources, {row: float(spans.begin[at[row]]) for row in sources})
+    return Exchanged(after, found.meetings, keys, tuple(renamed), tuple(events))
+
+
+def _moved(targets: Targets, sources: dict[int, int], begin: dict[int, float]) -> Targets:
+    """The targets, each row of `sources` with the identity of another: looks since `begin` stay with the bodies."""
+    columns: dict[str, NDArray[Any]] = {name: getattr(targets, name).copy() for name in OWN}
     looked, looks = targets.looked.copy(), {name: some.copy() for name, some in targets.looks.items()}
     size = looked.shape[1]
-    for one, other in ((0, 1), (1, 0)):
-        order = np.concatenate([np.flatnonzero(before[other]), size + np.flatnonzero(~before[one])])[-size:]
+    for row, source in sources.items():
+        for name in OWN:
+            columns[name][row] = getattr(targets, name)[source]
+        old = np.flatnonzero(targets.looked[source] < begin[source])
+        order = np.concatenate([old, size + np.flatnonzero(targets.looked[row] >= begin[row])])[-size:]
         places: list[tuple[NDArray[Any], NDArray[Any], float]] = [(looked, targets.looked, NEVER)]
         places += [(looks[name], targets.looks[name], 0.0) for name in looks]
-        for column, source, nothing in places:
-            both = np.concatenate(
-                [source[pair[other]], source[pair[one]]]
-            )  # the other's old ones, its own new ones
-            column[pair[one]] = nothing
-            column[pair[one], size - len(order) :] = both[order]
+        for column, before, nothing in places:
+            both = np.concatenate([before[source], before[row]])  # the other's old ones, its own new ones
+            column[row] = nothing
+            column[row, size - len(order) :] = both[order]
     return targets.replace(**columns, looked=looked, looks=looks)
+
+
+def _companies(keys: NDArray[np.int64]) -> list[tuple[int, ...]]:
+    """Who met whom, one by another: sets of keys (C, 2), each in order."""
+    company: dict[int, set[int]] = {}
+    for one, other in keys.tolist():
+        both = company.get(one, {one}) | company.get(other, {other})
+        for key in both:
+            company[key] = both
+    return sorted({tuple(sorted(both)) for both in company.values()})
+
+
+def _unsettled(targets: Targets, meetings: Meetings) -> Meetings:
+    """The meetings of which too little has been seen since to leave it at that."""
+    rows = {key: row for row, key in enumerate(targets.keys.tolist())}
+    kept = []
+    for (one, other), last in zip(meetings.keys.tolist(), meetings.last.tolist(), strict=True):
+        pair = np.array([rows.get(one, -1), rows.get(other, -1)])
+        seen = (targets.looked[pair] > last).sum(axis=1)
+        kept.append(bool((pair >= 0).all() and seen.min() < _ENOUGH))
+    return meetings.take(np.array(kept, np.bool_))

@@ -66,7 +66,7 @@ class MultiFeature:
     """Eight cues or more, weighed for the context; links over a window of time, so that missed detections do not matter."""
 
     window: float = parameter(
-        2.0, "how long a target that is not seen can still be linked", unit="s", low=0.0, high=3600.0, symbol="T2"
+        1.8, "how long a target that is not seen can still be linked", unit="s", low=0.0, high=3600.0, symbol="T2"
     )
     similar: float = parameter(
         0.0,
@@ -79,7 +79,7 @@ class MultiFeature:
         0.3, "highest weight of the long-term similarity", low=0.0, high=1.0, symbol="Th4"
     )
     lookback: float = parameter(
-        0.7, "time over whose objects a trajectory is averaged", unit="s", low=0.01, high=60.0, symbol="Q"
+        0.9, "time over whose objects a trajectory is averaged", unit="s", low=0.01, high=60.0, symbol="Q"
     )
     confirm: float = parameter(
         0.25, "how long a target must have been seen before it is said", unit="s", low=0.0, high=60.0, symbol="Th5"
@@ -97,12 +97,12 @@ class MultiFeature:
         "who gets which object: fathers as in the paper, fathers until nothing changes, or the highest total",
         choices=tuple(ASSIGNMENTS),
     )
-    inertia: float = parameter(0.8, "time over which speed is averaged", unit="s", low=0.01, high=60.0)
+    inertia: float = parameter(0.9, "time over which speed is averaged", unit="s", low=0.01, high=60.0)
     believed_after: float = parameter(
         0.05, "time that a target must be followed for its speed to be believed", unit="s", low=0.001, high=60.0
     )
     waning: float = parameter(
-        0.3, "how much less similar a target counts that is not seen, at the end of the window", low=0.0, high=1.0
+        0.2, "how much less similar a target counts that is not seen, at the end of the window", low=0.0, high=1.0
     )
     sure_score: float = parameter(
         0.6, "score from which a region may be any target; others get a second look", low=0.0, high=1.0
@@ -110,7 +110,7 @@ class MultiFeature:
     birth_score: float = parameter(0.7, "score from which a region may be a new target", low=0.0, high=1.0)
     weak_score: float = parameter(0.1, "score from which a region gets a second look", low=0.0, high=1.0)
     weak_similar: float = parameter(
-        0.6, "similarity from which a region of low score may be a target", low=0.0, high=1.0
+        0.55, "similarity from which a region of low score may be a target", low=0.0, high=1.0
     )
     fill: float = parameter(
         1.0, "gap up to which interpolated rows count as results", unit="s", low=0.0, high=3600.0
@@ -123,10 +123,10 @@ class MultiFeature:
         high=3600.0,
     )
     likeness: float = parameter(
-        3.0, "log odds of looks and way from which a lost target is found again", unit="nats", low=-20.0, high=20.0
+        0.0, "log odds of looks and way from which a lost target is found again", unit="nats", low=-20.0, high=20.0
     )
     exchange: float = parameter(
-        4.0, "log odds of looks from which two who met have changed places", unit="nats", low=-20.0, high=100.0
+        5.0, "log odds of looks from which two who met have changed places", unit="nats", low=-20.0, high=100.0
     )
     gap: float = parameter(
         0.0, "how long one that has not been said yet may be missed", unit="s", low=0.0, high=60.0
@@ -254,11 +254,11 @@ class MultiFeature:
         region, where = np.concatenate([region, births]), np.concatenate([where, regions.boxes[births]])
         smooth = np.concatenate([smooth, regions.boxes[births]])
         telling, found = state.telling, Recalled.nobody(targets)
-        meetings, swapped = state.meetings, Exchanged(targets, state.meetings, (), ())
+        meetings, swapped = state.meetings, Exchanged(targets, state.meetings, {}, (), ())
         if frame.image is not None:
             kinds = looks_for(scene, self.network)
             targets, telling, fresh = looked(kinds, targets, region, telling, frame, seen, state.size)
-            active = (targets.missed <= self.window + 1e-9) & (targets.ids > 0)
+            active = targets.missed <= self.window + 1e-9
             meetings = met(state.meetings, targets, where, active, frame)
             swapped = exchange(kinds, telling, targets, meetings, fresh, frame, self.exchange)
             targets, meetings = swapped.targets, swapped.meetings
@@ -266,7 +266,7 @@ class MultiFeature:
             found = recall(kinds, telling, targets, region, fresh, frame, state.size, zones, limits)
         targets, region, where = found.targets.take(found.kept), region[found.kept], where[found.kept]
         smooth = smooth[found.kept]
-        unsaid = rekeyed(state.unsaid, found.keys)
+        unsaid = rekeyed(rekeyed(state.unsaid, swapped.keys), found.keys)
         moment = Moment(
             frame, regions, region, where, smooth, self.smooth * (1 - state.jitter.gain.mean()), state.size, zones
         )

@@ -13,7 +13,9 @@ from perdure.scene.context import Context
 from perdure.types import Scene
 
 GATE = "displacement_2d"  # always described: pairs that it says nothing for are not compared at all
-DEFAULT = Context("default", {"overlap": 1.0, "shape_ratio": 0.3, "area": 0.3}, similar=0.35)
+DEFAULT = Context(
+    "default", {"displacement_2d": 0.25, "shape_ratio": 0.1, "area": 0.3, "overlap": 1.0}, similar=0.31
+)
 LOOKS = ("histogram", "covariance", "dominant")  # by which who was lost, or met somebody, is known again
 
 
