@@ -186,15 +186,15 @@ class _Spans(NamedTuple):
 
     begin: NDArray[np.float64]  # s
     end: NDArray[np.float64]  # s
-    nearest: NDArray[np.int64]  # the frame in which it was nearest to another
+    nearest: NDArray[np.int64]  # the last frame in which it was nearest to another
 
 
 def _spans(targets: Targets, meetings: Meetings, members: Index) -> _Spans:
     mine = (meetings.keys[:, :, None] == targets.keys[members]).any(axis=1)  # (C, M)
     begin = np.where(mine, meetings.begin[:, None], np.inf).min(axis=0)
     end = np.where(mine, meetings.last[:, None], -np.inf).max(axis=0)
-    most = np.where(mine, meetings.overlap[:, None], -1.0).argmax(axis=0)
-    return _Spans(begin, end, meetings.nearest[most])
+    latest = np.where(mine, meetings.nearest[:, None], -1).max(axis=0)
+    return _Spans(begin, end, latest)
 
 
 def _given(
@@ -206,20 +206,30 @@ def _given(
     freed = sorted(set(changed) - set(changed.values()))  # identities without a body: they go to who is lost
     sources = {**changed, **dict(zip(sorted(set(changed.values()) - set(changed)), freed, strict=True))}
     renamed, keys, events = list(found.renamed), dict(found.keys), list(found.events)
+    moments: list[int] = []
     for body, identity in changed.items():
-        begin = int(spans.nearest[at[body]])
+        begin = _moment(
+            found.meetings, int(targets.keys[body]), int(targets.keys[identity]), spans.nearest[at[body]]
+        )
+        moments.append(begin)
         fresh = bool(targets.first[body] >= begin)
         old, new = int(targets.ids[body]), int(targets.ids[identity])
         if old > 0 and new > 0:
             renamed.append(Renamed(old, new, int(targets.first[body]) if fresh else begin, frame.index))
         elif old == 0:
             keys[int(targets.keys[body])] = int(targets.keys[identity])
-    begin = min(int(spans.nearest[at[body]]) for body in changed)
+    begin = min(moments)
     ids = tuple(sorted({int(targets.ids[row]) for row in sources if targets.ids[row] > 0}))
     why = f"by their looks before and after they met: log odds {gain:.1f}"
     events.append(Event("exchanged", begin, frame.index, ids, why=why))
     after = _moved(targets, sources, {row: float(spans.begin[at[row]]) for row in sources})
     return Exchanged(after, found.meetings, keys, tuple(renamed), tuple(events))
+
+
+def _moment(meetings: Meetings, one: int, other: int, otherwise: np.int64) -> int:
+    """The frame in which two were nearest; another, if they met only through others."""
+    both = ((meetings.keys == one) | (meetings.keys == other)).all(axis=1)
+    return int(meetings.nearest[both][-1] if both.any() else otherwise)
 
 
 def _moved(targets: Targets, sources: dict[int, int], begin: dict[int, float]) -> Targets:
@@ -251,12 +261,25 @@ def _companies(keys: NDArray[np.int64]) -> list[tuple[int, ...]]:
     return sorted({tuple(sorted(both)) for both in company.values()})
 
 
-def _unsettled(targets: Targets, meetings: Meetings) -> Meetings:
-    """The meetings of which too little has been seen since to leave it at that."""
+def in_doubt(targets: Targets, meetings: Meetings) -> NDArray[np.float64]:
+    """Return since when (N,) each has been with others, so that it is not settled who it is; inf for who has not."""
+    since = np.full(len(targets), np.inf)
     rows = {key: row for row, key in enumerate(targets.keys.tolist())}
-    kept = []
-    for (one, other), last in zip(meetings.keys.tolist(), meetings.last.tolist(), strict=True):
-        pair = np.array([rows.get(one, -1), rows.get(other, -1)])
-        seen = (targets.looked[pair] > last).sum(axis=1)
-        kept.append(bool((pair >= 0).all() and seen.min() < _ENOUGH))
-    return meetings.take(np.array(kept, np.bool_))
+    for pair, begin in zip(meetings.keys.tolist(), meetings.begin.tolist(), strict=True):
+        for key in pair:
+            if key in rows:
+                since[rows[key]] = min(since[rows[key]], begin)
+    return since
+
+
+def _unsettled(targets: Targets, meetings: Meetings) -> Meetings:
+    """The meetings of companies of which too little has been seen since to leave it at that."""
+    rows = {key: row for row, key in enumerate(targets.keys.tolist())}
+    settled: set[int] = set()
+    for company in _companies(meetings.keys):
+        members = np.array([rows[key] for key in company if key in rows], np.intp)
+        end = _spans(targets, meetings, members).end
+        looks = (targets.looked[members] > end[:, None]).sum(axis=1)
+        if (looks[targets.missed[members] == 0] >= _ENOUGH).all():
+            settled |= set(company)
+    return meetings.take(np.array([one not in settled for one, _ in meetings.keys.tolist()], np.bool_))

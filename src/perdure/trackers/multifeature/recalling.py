@@ -24,6 +24,8 @@ from perdure.types import Boxes, Event, Frame, Regions, Renamed
 
 Index = NDArray[np.intp]
 _SPACING = 0.4  # s between looks
+_SOON = 1.0  # s, about which looks are all as near to each other as they come
+_KEPT = 6  # looks from before a doubt that are kept through it
 _ALONE = 0.1  # share of a box in another up to which it is seen by itself
 _MEMORY = 3000.0  # pairs of looks
 _BEFORE = 20.0  # pairs that what is thought before counts for
@@ -79,10 +81,12 @@ def looked(
     frame: Frame,
     regions: Regions,
     size: tuple[int, int],
+    doubt: NDArray[np.float64],
 ) -> tuple[Targets, Telling, Index]:
     """Remember how targets look that are seen by themselves, and learn how looks differ; return whose are new.
 
-    Only they are described, by `kinds`, the features of looks.
+    Only they are described, by `kinds`, the features of looks. Who is in `doubt` since some time (N,) keeps looks from
+    before it.
     """
     alone = _alone(regions.boxes, size)
     due = frame.time - targets.looked[:, -1] >= _SPACING - 1e-9
@@ -96,14 +100,37 @@ def looked(
     )
     fresh, new = fresh[there], {name: some[there] for name, some in new.items()}
     telling = _learnt(kinds, targets, fresh, new, telling, frame.time)
+    order = _slots(targets.looked[fresh], doubt[fresh], frame.time)
     looks = {name: old.copy() for name, old in targets.looks.items()}
     for name, old in looks.items():
-        old[fresh, :-1] = old[fresh, 1:]
-        old[fresh, -1] = new[name]
+        old[fresh] = np.concatenate([old[fresh], new[name][:, None]], axis=1)[
+            np.arange(len(fresh))[:, None], order
+        ]
     when = targets.looked.copy()
-    when[fresh, :-1] = when[fresh, 1:]
-    when[fresh, -1] = frame.time
+    now = np.full((len(fresh), 1), frame.time)
+    when[fresh] = np.take_along_axis(np.concatenate([when[fresh], now], axis=1), order, axis=1)
     return targets.replace(looks=looks, looked=when), telling, fresh
+
+
+def _slots(when: NDArray[np.float64], doubt: NDArray[np.float64], time: float) -> Index:
+    """Which of the looks (F, E) of some times and a new one are kept (F, E): many of late, few of long ago.
+
+    The one goes that is nearest to its neighbours in time for its age: things look different from every side, and one
+    that was seen from many is known again sooner. Of one in doubt none goes from before, unless there are more than
+    enough.
+    """
+    count = when.shape[1]
+    whole = np.concatenate([when, np.full((len(when), 1), time)], axis=1)  # (F, E + 1)
+    between = np.full_like(when, np.inf)
+    between[:, 1:] = whole[:, 2:] - whole[:, :-2]
+    crowded = between / (time - when + _SOON)
+    before = when < doubt[:, None]
+    enough = (before & (when > NEVER)).sum(axis=1) > _KEPT
+    crowded[np.isfinite(doubt)[:, None] & before & ~enough[:, None]] = np.inf
+    crowded[when <= NEVER] = -np.inf  # what is empty goes first
+    gone = crowded.argmin(axis=1)[:, None]
+    slots = np.arange(count)
+    return np.asarray(slots + (slots >= gone), np.intp)
 
 
 def alike(

@@ -16,7 +16,7 @@ Index = NDArray[np.intp]
 Rows = dict[str, Float]
 """A row (N, …) for each object, by feature."""
 NEVER = -1e9  # s
-LOOKS = 8  # E: how many looks are kept
+LOOKS = 12  # E: how many looks are kept
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from perdure.scene.context import Context, distance, nearest
 from perdure.scene.ground import Ground
 from perdure.scene.measuring import Measuring
 from perdure.scene.zones import FORBIDDEN, Zones, counting, renumbered
-from perdure.trackers.multifeature.exchanging import Exchanged, Meetings, exchange, met
+from perdure.trackers.multifeature.exchanging import Exchanged, Meetings, exchange, in_doubt, met
 from perdure.trackers.multifeature.explaining import explained
 from perdure.trackers.multifeature.fathers import ASSIGNMENTS
 from perdure.trackers.multifeature.links import Links, compare, global_similarity, weighted
@@ -257,7 +257,8 @@ class MultiFeature:
         meetings, swapped = state.meetings, Exchanged(targets, state.meetings, {}, (), ())
         if frame.image is not None:
             kinds = looks_for(scene, self.network)
-            targets, telling, fresh = looked(kinds, targets, region, telling, frame, seen, state.size)
+            doubt = in_doubt(targets, state.meetings)
+            targets, telling, fresh = looked(kinds, targets, region, telling, frame, seen, state.size, doubt)
             active = targets.missed <= self.window + 1e-9
             meetings = met(state.meetings, targets, where, active, frame)
             swapped = exchange(kinds, telling, targets, meetings, fresh, frame, self.exchange)
