@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from perdure import params
 from perdure.errors import ParameterError
+from perdure.features import pool
 from perdure.features.boxes import overlaps
 from perdure.features.feature import Feature, Memory
 from perdure.features.pool import POOL
@@ -71,10 +72,13 @@ class Learning:
         0.05, "a feature that would weigh less is left out, and need not be computed", low=0.0, high=0.5
     )
     least_score: float = parameter(0.0, "detections of a lower score are left out", low=0.0, high=1.0)
+    ours: bool = parameter(True, "features beyond the paper's eight may be chosen too")
     most: int = parameter(100_000, "pairs that are kept, half of them same ones", low=100, high=10_000_000)
 
 
-PAPER = Learning(similar=0.5, gap=0.0, gated=False, carried=0.0, balanced=False, levels=False, least_weight=0.0)
+PAPER = Learning(
+    similar=0.5, gap=0.0, gated=False, carried=0.0, balanced=False, levels=False, least_weight=0.0, ours=False
+)
 
 
 class Film(NamedTuple):
@@ -186,7 +190,9 @@ def _boosted(samples: Samples, learning: Learning) -> tuple[Boosted, tuple[str, 
     """The rounds and weights; displacement alone where there is nothing to tell apart, and a note why."""
     if samples.same.all():
         return _by_displacement(samples), ("nothing else is near the objects: displacement alone",)
-    given = samples.similarities, samples.known, samples.labels, _initial(samples, learning), learning.rounds
+    allowed = np.array([learning.ours or name in pool.PAPER for name in POOL])
+    known = samples.known & allowed
+    given = samples.similarities, known, samples.labels, _initial(samples, learning), learning.rounds
     found = boost_at(learning.similar, *given) if learning.similar else boost_stumps(*given)
     if not found.rounds:
         return _by_displacement(samples), ("no feature tells the pairs apart: displacement alone",)

@@ -190,8 +190,9 @@ def test_in_low_contrast_the_lost_are_looked_for_for_longer(tracker: str):
     dark = Zone("low-contrast", "dark", rectangle(40, 0, 80, 80))
     patience = 1.0
     world = World((Block(still(50, 30, 3, 20)), Block(still(50, 30, 36))), count=60)
-    assert told(tracker, world, patience=patience).ids == [1, 2]
-    assert told(tracker, world, (dark,), patience=patience).ids == [1]
+    kept = {"window" if tracker == "multifeature" else "patience": patience}
+    assert told(tracker, world, **kept).ids == [1, 2]
+    assert told(tracker, world, (dark,), **kept).ids == [1]
 
 
 @boxes_alone
@@ -199,7 +200,11 @@ def test_in_low_contrast_a_region_may_be_farther_away(tracker: str):
     """Somebody who stands jumps by more than half of his width."""
     dark = Zone("low-contrast", "dark", rectangle(20, 0, 100, 80), distance=3.0)
     world = World((Block(lambda k: (50 if k < 20 else 56, 30)),), count=40)
-    narrow = {"compound": {"max_distance": 0.6}, "overlap": {"least_overlap": 0.4}}[tracker]
+    narrow = {
+        "compound": {"max_distance": 0.6},
+        "overlap": {"least_overlap": 0.4},
+        "multifeature": {"weights": "overlap=1", "similar": 0.4},
+    }[tracker]
     assert told(tracker, world, **narrow).ids == [1, 2]
     assert told(tracker, world, (dark,), **narrow).ids == [1]
 

@@ -237,7 +237,7 @@ class MultiFeature:
         places = expected(state.targets, frame.time, self.inertia, self.believed_after)
         where = _boxes(places[GATE])
         onward = _boxes(expected(state.targets, frame.time, self.inertia, self.believed_after, 0.0)[GATE])
-        links = self._links(state.targets, features, places, regions, rows, frame, context)
+        links = self._links(state.targets, features, places, regions, rows, frame, context, zones)
         score = self._scores(links, state, where, regions, frame, context)
         pairs = self._official(state, score, regions, frame)
         told = explained(state.targets, links, score, pairs, regions, context) if self.explain else ()
@@ -313,9 +313,10 @@ class MultiFeature:
         rows: Rows,
         frame: Frame,
         context: Context,
+        zones: Zones,
     ) -> Links:
         """Compare every target of the window with every object that it may have come to (section 4.1)."""
-        active = np.flatnonzero(self._looked_for(targets))
+        active = np.flatnonzero(targets.missed <= self.window * zones.stays(targets.last) + 1e-9)
         one, other = (part.ravel() for part in np.meshgrid(active, np.arange(len(regions)), indexing="ij"))
         elapsed = np.maximum(frame.time - targets.seen[one], 1e-6)
         gate = next(feature for feature in features if feature.name == GATE)
@@ -323,10 +324,6 @@ class MultiFeature:
         near = both & (gate.similarity(places[GATE][one], rows[GATE][other], elapsed) > 0)
         moved = targets.replace(rows={**targets.rows, **places})
         return compare(features, moved, rows, (one[near], other[near]), elapsed[near], self.long_term, context)
-
-    def _looked_for(self, targets: Targets) -> NDArray[np.bool_]:
-        """Which targets (N,) are still looked for where they would have come."""
-        return np.asarray(targets.missed <= self.window + 1e-9)
 
     def _scores(
         self,
