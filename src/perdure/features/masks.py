@@ -18,13 +18,18 @@ def disjoint(masks: Sequence[Mask], height: int, width: int) -> tuple[Mask, ...]
     [(0, 0, 2, 2), (2, 0, 4, 2)]
     """
     kept: list[Mask] = []
+    claimed: list[Mask] = []  # of those, the ones that have a pixel
     for mask in masks:
+        if not mask.bits.size:
+            kept.append(mask)
+            continue
         bits = _inside(mask, height, width)
-        for earlier in kept:
+        for earlier in claimed:
             _remove(bits, mask, earlier)
         kept.append(
             mask if np.array_equal(bits, mask.bits) and _is_tight(bits) else Mask.of_image(bits, mask.y, mask.x)
         )
+        claimed.append(kept[-1])
     return tuple(kept)
 
 
