@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.pool import POOL
+from perdure.features.pool import EMBEDDING, POOL
 from perdure.params import Value, unknown_name
 from perdure.scene.measuring import Measures, difference
 from perdure.types import Scene
@@ -82,8 +82,8 @@ class Context:
 
     def __post_init__(self) -> None:
         for name, weight in self.weights.items():
-            if name not in POOL:
-                raise ValueError(unknown_name("feature", name, POOL))
+            if name not in (*POOL, EMBEDDING):
+                raise ValueError(unknown_name("feature", name, (*POOL, EMBEDDING)))
             if not (math.isfinite(weight) and weight >= 0):
                 raise ValueError(f"the weight of {name} is {weight:g}; it must be a number ≥ 0")
         if not any(self.weights.values()):
@@ -91,15 +91,15 @@ class Context:
         if not 0 <= self.similar <= 1:
             raise ValueError(f"similar = {self.similar:g} is out of range: it must be 0 to 1")
         for name, (low, high) in self.levels.items():
-            if name not in POOL:
-                raise ValueError(unknown_name("feature", name, POOL))
+            if name not in (*POOL, EMBEDDING):
+                raise ValueError(unknown_name("feature", name, (*POOL, EMBEDDING)))
             if not 0 <= low < high <= 1:
                 raise ValueError(f"the levels of {name} are {low:g} and {high:g}; they must rise, from 0 to 1")
 
     @property
     def used(self) -> tuple[str, ...]:
         """The features that weigh anything, in the order of the pool."""
-        return tuple(name for name in POOL if self.weights.get(name, 0.0) > 0)
+        return tuple(name for name in (*POOL, EMBEDDING) if self.weights.get(name, 0.0) > 0)
 
     def levelled(self, name: str, similarity: NDArray[np.floating]) -> NDArray[np.floating]:
         """Return a feature's similarities as they count: brought to the levels, where there are any.
@@ -163,4 +163,4 @@ def distance(context: Context, measures: Measures) -> float:
 @functools.cache
 def needs_pixels(name: str) -> bool:
     """Return whether a feature of the pool says nothing without pictures."""
-    return POOL[name](Scene(1, 1)).needs_pixels
+    return name == EMBEDDING or POOL[name](Scene(1, 1)).needs_pixels
