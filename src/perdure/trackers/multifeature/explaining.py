@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +15,7 @@ from perdure.trackers.multifeature.targets import Targets
 from perdure.types import Explanation, Regions
 
 Index = NDArray[np.intp]
-RIVAL = "runner_up"
+RIVAL, ELSEWHERE = "runner_up", "other_region"
 
 
 def explained(
@@ -25,36 +28,69 @@ def explained(
     `runner_up:ID`, and of what else it might have been, `other_region:ROW`, with their scores.
     """
     order = {both: k for k, both in enumerate(zip(links.target.tolist(), links.region.tolist(), strict=True))}
+    numbers = np.array([order.get((row, column), -1) for row, column in pairs.tolist()], np.intp)
+    told = (numbers >= 0) & (targets.ids[pairs[:, 0]] > 0)
+    pairs, numbers = pairs[told], numbers[told]
+    rows, columns = pairs.T
+    figures: list[dict[str, float]] = [
+        {"score": one, "region": float(column)}
+        for one, column in zip(_short(score[rows, columns]), columns.tolist(), strict=True)
+    ]
     every = global_similarity(links)
+    for name in links.link:
+        weight = round(float(context.weights.get(name, 0.0)), 4)
+        there = links.known[name][numbers] & (weight > 0)
+        values = zip(_short(links.link[name][numbers]), _short(every[name][numbers]), strict=True)
+        for own, known, (link, whole) in zip(figures, there.tolist(), values, strict=True):
+            if known:
+                own |= {f"link:{name}": link, f"global:{name}": whole, f"weight:{name}": weight}
+    _add_rivals(figures, targets, score, rows, columns)
+    why = f"highest global similarity under the context {context.name!r}"
+    return [Explanation(one, why, own) for one, own in zip(targets.ids[rows].tolist(), figures, strict=True)]
+
+
+def restated(
+    explanations: Iterable[Explanation], ids: Mapping[int, int], numbers: Index | None = None
+) -> tuple[Explanation, ...]:
+    """Return the reasons with other ids, where `ids` has any, and with the `numbers` of regions among all of them."""
+    if numbers is None and all(old == new for old, new in ids.items()):
+        return tuple(explanations)
     found = []
-    for row, column in pairs.tolist():
-        number = order.get((row, column))
-        if targets.ids[row] == 0 or number is None:
-            continue
-        figures = {"score": float(score[row, column]), "region": float(column)}
-        for name, value in links.link.items():
-            weight = context.weights.get(name, 0.0)
-            if weight > 0 and links.known[name][number]:
-                figures[f"link:{name}"] = float(value[number])
-                figures[f"global:{name}"] = float(every[name][number])
-                figures[f"weight:{name}"] = float(weight)
-        figures |= _rivals(targets, score, row, column)
-        why = f"highest global similarity under the context {context.name!r}"
-        found.append(Explanation(int(targets.ids[row]), why, {key: round(one, 4) for key, one in figures.items()}))
-    return found
+    for one in explanations:
+        figures = {}
+        for key, value in one.figures.items():
+            name, _, which = key.partition(":")
+            if name == RIVAL:
+                key = f"{RIVAL}:{ids.get(int(which), int(which))}"
+            elif name == ELSEWHERE and numbers is not None:
+                key = f"{ELSEWHERE}:{numbers[int(which)]}"
+            figures[key] = float(numbers[int(value)]) if name == "region" and numbers is not None else value
+        found.append(replace(one, id=ids.get(one.id, one.id), figures=figures))
+    return tuple(found)
 
 
-def _rivals(targets: Targets, score: Float, row: int, column: int) -> dict[str, float]:
-    """The best other target of the same object, and the best other object of the same target."""
-    figures = {}
-    others = np.where(targets.ids > 0, score[:, column], -np.inf)
-    others[row] = -np.inf
-    if np.isfinite(others).any():
-        best = int(others.argmax())
-        figures[f"{RIVAL}:{int(targets.ids[best])}"] = float(others[best])
-    regions = score[row].copy()
-    regions[column] = -np.inf
-    if np.isfinite(regions).any():
-        best = int(regions.argmax())
-        figures[f"other_region:{best}"] = float(regions[best])
-    return figures
+def _add_rivals(
+    figures: list[dict[str, float]], targets: Targets, score: Float, rows: Index, columns: Index
+) -> None:
+    """Add to the figures of each link the best other target of its object, and the best other object of its target."""
+    if not len(rows):
+        return
+    links = np.arange(len(rows))
+    others = np.where(targets.ids[:, None] > 0, score[:, columns], -np.inf)  # (N, K)
+    others[rows, links] = -np.inf
+    regions = score[rows]  # (K, M)
+    regions[links, columns] = -np.inf
+    first, elsewhere = others.argmax(axis=0), regions.argmax(axis=1)
+    for key, names, values in (
+        (RIVAL, targets.ids[first], others[first, links]),
+        (ELSEWHERE, elsewhere, regions[links, elsewhere]),
+    ):
+        there = np.isfinite(values).tolist()
+        for own, known, name, value in zip(figures, there, names.tolist(), _short(values), strict=True):
+            if known:
+                own[f"{key}:{name}"] = value
+
+
+def _short(values: Float) -> list[float]:
+    """Values (K,) as figures of four digits."""
+    return [round(one, 4) for one in values.tolist()]

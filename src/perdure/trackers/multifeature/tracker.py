@@ -24,7 +24,7 @@ from perdure.scene.ground import Ground
 from perdure.scene.measuring import Measuring
 from perdure.scene.zones import FORBIDDEN, Zones, counting, renumbered
 from perdure.trackers.multifeature.exchanging import Exchanged, Meetings, exchange, in_doubt, met
-from perdure.trackers.multifeature.explaining import explained
+from perdure.trackers.multifeature.explaining import explained, restated
 from perdure.trackers.multifeature.fathers import ASSIGNMENTS
 from perdure.trackers.multifeature.links import Links, compare, global_similarity, weighted
 from perdure.trackers.multifeature.motion import expected
@@ -131,7 +131,7 @@ class MultiFeature:
     gap: float = parameter(
         0.0, "how long one that has not been said yet may be missed", unit="s", low=0.0, high=60.0
     )
-    explain: bool = parameter(False, "whether the reason of every link is put down, for `perdure explain`")
+    explain: bool = parameter(True, "whether the reason of every link is put down, for `perdure explain`")
     smooth: float = parameter(
         1.0, "how much of the jitter of boxes, which is learnt, is smoothed away", low=0.0, high=1.0
     )
@@ -224,7 +224,8 @@ class MultiFeature:
         after, report, numbers = counting(state.zones, regions, partial(self._step, state, frame))
         unsaid = renumbered(after.unsaid, frame.index, numbers)
         rows = renumbered(report.rows, frame.index, numbers)
-        return replace(after, unsaid=unsaid), replace(report, rows=rows)
+        reasons = restated(report.explanations, {}, numbers)
+        return replace(after, unsaid=unsaid), replace(report, rows=rows, explanations=reasons)
 
     def _step(self, state: MultiFeatureState, frame: Frame, regions: Regions) -> tuple[MultiFeatureState, Report]:
         zones, scene = state.zones, Scene(state.size[1], state.size[0], state.fps, ground=state.ground)
@@ -265,6 +266,9 @@ class MultiFeature:
             targets, meetings = swapped.targets, swapped.meetings
             limits = (self.recall, self.likeness)
             found = recall(kinds, telling, targets, region, fresh, frame, state.size, zones, limits)
+        known_as = dict(
+            zip(state.targets.ids.tolist(), found.targets.ids.tolist(), strict=False)
+        )  # newborn ones behind
         targets, region, where = found.targets.take(found.kept), region[found.kept], where[found.kept]
         smooth = smooth[found.kept]
         unsaid = rekeyed(rekeyed(state.unsaid, swapped.keys), found.keys)
@@ -288,7 +292,10 @@ class MultiFeature:
         )
         events = (*chosen, *said.events, *again, *swapped.events, *found.events, *hidden, *left)
         return after, Report(
-            said.rows, renamed=(*swapped.renamed, *found.renamed), events=events, explanations=tuple(told)
+            said.rows,
+            renamed=(*swapped.renamed, *found.renamed),
+            events=events,
+            explanations=restated(told, known_as),
         )
 
     def finish(self, state: MultiFeatureState) -> Report:
