@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from perdure import params
+from perdure.equipment import AnyContext, equipped
 from perdure.errors import ParameterError
 from perdure.files.zones import read_zones
 from perdure.scene.zones import Zones
@@ -43,6 +45,8 @@ class Online:
         The picture's size; masks and boxes are cut to it. 0: taken from the first frame, else unknown.
     zones : str, Path, Zones or None
         Zones of the place and rules between them, in pixels of the picture: a file of GeoJSON.
+    context, embedding
+        For the multi-feature tracker, as for `perdure.plan`.
     parameters
         The tracker's parameters by name.
 
@@ -63,12 +67,14 @@ class Online:
         width: int = 0,
         height: int = 0,
         zones: str | Path | Zones | None = None,
+        context: AnyContext | Sequence[AnyContext] | None = None,
+        embedding: str | Path | None = None,
         **parameters: object,
     ) -> None:
         if not isinstance(tracker, str) or tracker not in TRACKERS:
             raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
         camera = params.build(_Camera, {"fps": fps, "width": width, "height": height})
-        self.tracker = params.build(TRACKERS[tracker], parameters)
+        self.tracker = equipped(params.build(TRACKERS[tracker], parameters), tracker, context, embedding)
         self._fps, self._size = camera.fps, (camera.width, camera.height)
         self._zones = read_zones(zones, *self._size) if isinstance(zones, (str, Path)) else zones
         self.reset()

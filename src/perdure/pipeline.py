@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure import fold, params
+from perdure import equipment, fold, params
 from perdure.detect import DETECTORS, Mark, Marked, Recorded, WithMarks
+from perdure.equipment import AnyContext, equipped
 from perdure.errors import DamagedVideo, FormatError, ParameterError
 from perdure.files.calibration import read_calibration
 from perdure.files.marks import AnyMark, read_marks, words_of
@@ -56,6 +57,7 @@ class Plan:
     marks: tuple[Mark, ...] = ()  # what he marked beside the detector's regions
     body: float = 0.0  # m that people are high; above 0 where the ground is to be estimated from them
     estimate: Estimate | None = None  # what they told of it
+    contexts: tuple[str, ...] = ()  # that the user named, in words
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -64,6 +66,8 @@ class Plan:
                 raise ParameterError(
                     f"{self.source.name} has no images and this {what} needs them; name a --detector FILE"
                 )
+        if not self.source.has_images:
+            equipment.check_looks(self.tracker, self.source.name)
         if self.classes and self.detector_name == "marked":
             raise ParameterError("what is marked has no class; leave out --class")
         if self.classes and self.detector_name == "background":
@@ -112,7 +116,7 @@ class Plan:
 
     def notes(self) -> tuple[str, ...]:
         """Return what the user should know about how source, detections and tracker went together."""
-        return (*self._of_marks(), *self._of_detections(), *self._of_ground())
+        return (*self._of_marks(), *self._of_detections(), *self._of_ground(), *self._of_contexts())
 
     def _of_ground(self) -> tuple[str, ...]:
         """What the user should know of the ground that was to be estimated."""
@@ -126,6 +130,11 @@ class Plan:
                 f"± {told.height * off[0]:.1f} above it, tilted by {math.degrees(told.tilt):.0f}° ± {math.degrees(off[1]):.0f}",
             )
         return (f"the ground plane is not known ({self.estimate.verdict}); give --calibration FILE",)
+
+    def _of_contexts(self) -> tuple[str, ...]:
+        """What the user should know about the contexts and the network that he named."""
+        pictures, ground = self.source.has_images, self.scene.ground is not None
+        return equipment.notes(self.tracker, self.contexts, pictures=pictures, ground=ground)
 
     def _of_marks(self) -> tuple[str, ...]:
         """What the user should know about his marks."""
@@ -190,6 +199,8 @@ def plan(
     object_height: float | None = None,
     zones: str | Path | Zones | None = None,
     classes: str | Collection[str] | None = (),
+    context: AnyContext | Sequence[AnyContext] | None = None,
+    embedding: str | Path | None = None,
     parameters: Mapping[str, object] | None = None,
 ) -> Plan:
     """Open a source and make the detector and tracker for it.
@@ -224,6 +235,11 @@ def plan(
         Entries, exits, occluders and other zones of the place, and rules between them: a file of GeoJSON.
     classes : str or collection of str
         Only regions of these classes.
+    context : str, Path, Context, sequence of them, or None
+        For the multi-feature tracker, what its features weigh: files of `perdure learn`, of which the nearest to the
+        video is in force; 'auto', those that come with Perdure; 'default', its own weights.
+    embedding : str, Path or None
+        For the multi-feature tracker, an ONNX file of a network by which looks are told apart, too.
     parameters : mapping
         Values of the detector's and tracker's parameters by name.
 
@@ -243,6 +259,7 @@ def plan(
             detector, name = _own_detections(opened), "recorded"
         of_tracker, of_detector = split(parameters or {}, tracker, name)
         made_tracker = params.build(TRACKERS[tracker], of_tracker)
+        made_tracker = equipped(made_tracker, tracker, context, embedding)
         made_detector = params.build(DETECTORS[name], of_detector)
         if name == "recorded":
             made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
@@ -262,7 +279,19 @@ def plan(
         if marks and follows_marks(made_tracker):
             made_tracker = dataclasses.replace(made_tracker, reserved=max(mark.id for mark in marks))
         wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
-        made = Plan(opened, scene, name, made_detector, tracker, made_tracker, wanted, words, marks, body)
+        made = Plan(
+            opened,
+            scene,
+            name,
+            made_detector,
+            tracker,
+            made_tracker,
+            wanted,
+            words,
+            marks,
+            body,
+            contexts=equipment.words_of(context),
+        )
         made.check()
     except BaseException:
         opened.close()
@@ -312,7 +341,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
         Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, zones, calibration, object_height,
-        classes; and parameters of the detector and the tracker by name.
+        classes, context, embedding; and parameters of the detector and the tracker by name.
 
     Raises
     ------
@@ -455,6 +484,8 @@ _OPTIONS = frozenset(
         "calibration",
         "object_height",
         "classes",
+        "context",
+        "embedding",
         "parameters",
     )
 )

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Optional, TypeVar
 import typer
 
 from perdure import params
+from perdure.equipment import USUAL
 from perdure.errors import ParameterError
 
 F = TypeVar("F", bound=Callable[..., None])
@@ -77,6 +78,26 @@ ZonesOption = Annotated[
         "--zones",
         metavar="FILE",
         help="Entries, exits, occluders and other zones of the place, and rules between them: GeoJSON in pixels.",
+        show_default=False,
+    ),
+]
+ContextOption = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--context",
+        metavar="FILE|auto|default",
+        help="What features weigh with --tracker multifeature: a file of `perdure learn`; of several, as it may be "
+        "repeated, the nearest to the video is in force. 'auto' are those that come with Perdure, 'default' the "
+        f"tracker's own weights. Default: {USUAL}.",
+        show_default=False,
+    ),
+]
+EmbeddingOption = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--embedding",
+        metavar="FILE",
+        help="An ONNX file of a re-identification network, by which --tracker multifeature tells looks apart, too.",
         show_default=False,
     ),
 ]

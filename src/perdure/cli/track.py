@@ -14,12 +14,13 @@ from typing import Annotated, Any
 
 import typer
 
-from perdure import params
+from perdure import equipment, params
 from perdure.cli import options
 from perdure.cli.film import draw_film, drawn_while_running
 from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
+from perdure.equipment import chosen_by
 from perdure.errors import OutputError
 from perdure.files.calibration import value_of
 from perdure.files.log import RunLog
@@ -59,6 +60,8 @@ def track(
     object_height: options.ObjectHeightOption = None,
     zones: options.ZonesOption = None,
     class_: options.ClassOption = None,
+    context: options.ContextOption = None,
+    embedding: options.EmbeddingOption = None,
     fps: options.FpsOption = None,
     start: options.StartOption = None,
     end: options.EndOption = None,
@@ -87,16 +90,18 @@ def track(
         object_height=object_height,
         zones=zones,
         classes=class_ or (),
+        context=context or None,
+        embedding=embedding,
         parameters=given,
     )
     place = output or Path("perdure-runs") / made.source.name
     inputs = [
         Path(one)
-        for one in (source, detector, roi, zones, calibration, parameters)
+        for one in (source, detector, roi, zones, calibration, parameters, embedding, *(context or ()))
         if one is not None and is_file(one)
     ]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
-    window = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
+    window: dict[str, Any] = {"fps": fps, "start": start, "end": end, "stride": stride, "roi": roi}
     if zones is not None:
         window["zones"] = str(zones)
     if calibration is not None:
@@ -163,6 +168,7 @@ def _run(
 ) -> Outcome:
     begun = time.monotonic()
     live_film = film and not made.source.rereadable
+    context = ""
     with RunLog(folder.log) as log:
         frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
         made = ending.first_look(made)
@@ -171,11 +177,13 @@ def _run(
         if live_film:
             steps = drawn_while_running(steps, made.scene, folder.film)
         for step in steps:
+            context = next(filter(None, (chosen_by(made.tracker, one) for one in step.report.events)), context)
             log.append(-1 if step.frame is None else step.frame.index, counted.time(step.frame), step.report)
     totals = folder.write_results(reporting)
     tracked = time.monotonic()
     status, message = ending.status, str(ending.damage or "")
     warnings = (*made.source.warnings, *made.notes())
+    about |= equipment.about(made.tracker, made.contexts, context)
     about |= {"frames": counted.frames, "warnings": list(warnings), **dataclasses.asdict(totals)}
     folder.write_about({**about, "status": status, "message": message})
     if film and not live_film and not ending.interrupted:
@@ -252,6 +260,8 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "detector": {"name": made.detector_name, "parameters": params.values(made.detector)},
         "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
+        **equipment.about(made.tracker, made.contexts),
+        **({"embedding": made.tracker.network.name} if getattr(made.tracker, "network", None) else {}),
         "reporting": params.values(reporting),
         **_ground(made),
         **({"zones": zones_to_json(Zones.of(made.scene))} if made.scene.zones else {}),

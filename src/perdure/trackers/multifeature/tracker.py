@@ -163,7 +163,7 @@ class MultiFeature:
         looks = looks_for(known, self.network)
         nobody, nothing = Frame(0, 0.0), Regions.empty()
         shapes = {one.name: one.describe({}, nobody, nothing)[1].shape[1:] for one in looks}
-        features = features_for(self._in_force(""), known, self.network)
+        features = features_for(self.in_force(""), known, self.network)
         memories = {one.name: dict(one.start(known)) for one in features}
         _, rows = _described(features, memories, nobody, nothing, known)
         return MultiFeatureState(
@@ -186,8 +186,8 @@ class MultiFeature:
             zones=Zones.of(scene),
         )
 
-    def _in_force(self, name: str) -> Context:
-        """The context in force: what the user gave, the one chosen by name, or that of boxes."""
+    def in_force(self, name: str) -> Context:
+        """Return the context in force: what the user gave, the one chosen by name, or that of boxes."""
         if self.weights:
             return Context("given", weights_of(self.weights), DEFAULT.similar)
         if len(self.contexts) == 1:
@@ -216,7 +216,7 @@ class MultiFeature:
         rival = (
             "" if found.runner_up is None else f"; next {found.runner_up.name} at {found.runner_up_distance:.2f}"
         )
-        why = f"nearest is {found.context.name}, at {found.distance:.2f}{rival}"
+        why = f"{found.context.name}: the nearest, at {found.distance:.2f}{rival}"  # the name first: `run.json` tells it
         return replace(state, context=found.context.name), [Event("context", frame.index, frame.index, why=why)]
 
     def step(self, state: MultiFeatureState, frame: Frame, regions: Regions) -> tuple[MultiFeatureState, Report]:
@@ -230,7 +230,7 @@ class MultiFeature:
     def _step(self, state: MultiFeatureState, frame: Frame, regions: Regions) -> tuple[MultiFeatureState, Report]:
         zones, scene = state.zones, Scene(state.size[1], state.size[0], state.fps, ground=state.ground)
         state, chosen = self._chosen(state, frame, regions, scene)
-        context = self._in_force(state.context)
+        context = self.in_force(state.context)
         features = features_for(context, scene, self.network)
         seen, backdrop = self._moving(state, regions, frame)
         memories, rows = _described(features, state.memories, frame, seen, scene)
