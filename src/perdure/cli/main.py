@@ -17,6 +17,7 @@ from perdure.cli.count import count
 from perdure.cli.demo import demo
 from perdure.cli.detect import detect
 from perdure.cli.draw import draw
+from perdure.cli.explain import explain
 from perdure.cli.export import export
 from perdure.cli.learn import LearnCommand, learn
 from perdure.cli.learn_zones import learn as learn_zones
@@ -50,7 +51,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, detect, draw, export, count, calibrate, context, demo, warmup):
+for command in (track, detect, draw, export, count, calibrate, context, explain, demo, warmup):
     app.command()(_interruptible(command))
 app.command(cls=LearnCommand)(_interruptible(learn))
 app.command("learn-zones")(_interruptible(learn_zones))
