@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Float = NDArray[np.float64]
 _MOST = 6.0  # log odds: however far out a number lies, more is not believed
 _RIDGE = 1e-4  # added to variances
+_LEAST = 1e-12  # variance along the direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,7 @@ def log_odds(one: Moments, other: Moments, numbers: Float) -> Float:
 
 
 def _log_density(place: Float, kind: Moments, direction: Float, beyond: float) -> Float:
-    middle, variance = float(kind.mean @ direction), float(direction @ kind.covariance @ direction)
+    middle = float(kind.mean @ direction)
+    variance = max(float(direction @ kind.covariance @ direction), _LEAST)  # 0 where the means are one
     off = np.where((place - middle) * beyond > 0, 0.0, place - middle)
     return np.asarray(-0.5 * (off**2 / variance + np.log(variance)), np.float64)
