@@ -29,11 +29,11 @@ def test_every_option_that_the_documents_name_exists():
         for page in PAGES
         for option in re.findall(r"(?<![\w-])--([a-z][a-z-]+)", page.read_text(encoding="utf-8"))
     }
-    declared = {
-        one.name.replace("_", "-")
-        for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning)
-        for one in params.describe(kind)
-    }
+    parameters = [
+        one for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning) for one in params.describe(kind)
+    ]
+    declared = {one.name.replace("_", "-") for one in parameters}
+    declared |= {f"no-{one.name.replace('_', '-')}" for one in parameters if one.kind is bool}
     programs = [*(ROOT / "src/perdure/cli").glob("*.py"), *(ROOT / "bench").glob("*.py")]
     source = "".join(path.read_text(encoding="utf-8") for path in programs)
     elsewhere = {"help", "check", "report-confidence"}  # ours, ruff's, and one read off its declaration

@@ -321,3 +321,5 @@ def test_reasons_are_renamed_and_their_regions_numbered_among_all():
     (one,) = restated([Explanation(3, "why", figures)], {3: 8, 4: 3}, np.array([2, 5]))
     assert one == Explanation(8, "why", {"score": 0.5, "region": 5.0, "runner_up:3": 0.3, "other_region:2": 0.2})
     assert restated([Explanation(3, "why", figures)], {1: 1}) == (Explanation(3, "why", figures),)
+    assert restated([Explanation(3, "why", figures)], {3: 0}) == ()
+    assert "runner_up:0" not in restated([Explanation(3, "why", figures)], {4: 0})[0].figures

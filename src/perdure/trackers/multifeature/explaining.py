@@ -52,7 +52,10 @@ def explained(
 def restated(
     explanations: Iterable[Explanation], ids: Mapping[int, int], numbers: Index | None = None
 ) -> tuple[Explanation, ...]:
-    """Return the reasons with other ids, where `ids` has any, and with the `numbers` of regions among all of them."""
+    """Return the reasons with other ids, where `ids` has any, and with the `numbers` of regions among all of them.
+
+    One whose id is 0 now has none any more, and nothing is said of it.
+    """
     if numbers is None and all(old == new for old, new in ids.items()):
         return tuple(explanations)
     found = []
@@ -61,12 +64,14 @@ def restated(
         for key, value in one.figures.items():
             name, _, which = key.partition(":")
             if name == RIVAL:
+                if not ids.get(int(which), int(which)):
+                    continue
                 key = f"{RIVAL}:{ids.get(int(which), int(which))}"
             elif name == ELSEWHERE and numbers is not None:
                 key = f"{ELSEWHERE}:{numbers[int(which)]}"
             figures[key] = float(numbers[int(value)]) if name == "region" and numbers is not None else value
         found.append(replace(one, id=ids.get(one.id, one.id), figures=figures))
-    return tuple(found)
+    return tuple(one for one in found if one.id)
 
 
 def _add_rivals(

@@ -268,7 +268,7 @@ class MultiFeature:
             found = recall(kinds, telling, targets, region, fresh, frame, state.size, zones, limits)
         known_as = dict(
             zip(state.targets.ids.tolist(), found.targets.ids.tolist(), strict=False)
-        )  # newborn ones behind
+        )  # but for newborn ones
         targets, region, where = found.targets.take(found.kept), region[found.kept], where[found.kept]
         smooth = smooth[found.kept]
         unsaid = rekeyed(rekeyed(state.unsaid, swapped.keys), found.keys)
