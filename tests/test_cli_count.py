@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 from worlds import Block, World, walk
 
-from perdure.cli.main import app
+from perdure.cli.commands import app
 from perdure.errors import PerdureError
 from perdure.files.zones import write_zones
 from perdure.scene.zones import Zone, Zones, rectangle

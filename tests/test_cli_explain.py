@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import perdure
 from perdure import equipment
-from perdure.cli.main import app
+from perdure.cli.commands import app
 from perdure.errors import FormatError, ParameterError
 from perdure.files.contexts import write_context
 from perdure.files.log import RunLog, read_log

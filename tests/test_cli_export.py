@@ -16,7 +16,7 @@ from shapely import from_wkt
 from shapely.geometry import MultiPolygon, Polygon, shape
 from worlds import two_apart
 
-from perdure.cli.main import run as run_command
+from perdure.cli.commands import run as run_command
 from perdure.files import mask_pngs, mots
 from perdure.files.log import RunLog, read_log
 from perdure.files.runs import RunFolder

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from perdure.cli.main import app
+from perdure.cli.commands import app
 from perdure.errors import ParameterError, PerdureError
 from perdure.files.calibration import read_calibration
 from perdure.files.runs import RunFolder

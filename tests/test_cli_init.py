@@ -15,7 +15,7 @@ import pytest
 from worlds import two_apart
 
 import perdure
-from perdure.cli.main import run as run_command
+from perdure.cli.commands import run as run_command
 from perdure.detect import Background, Marked
 from perdure.errors import ParameterError
 from perdure.files.log import read_log

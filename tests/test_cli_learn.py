@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from perdure.cli.main import app
+from perdure.cli.commands import app
 from perdure.errors import DamagedVideo
 from perdure.files.contexts import read_context
 

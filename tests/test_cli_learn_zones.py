@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 from worlds import Block, World, walk
 
+from perdure.cli.commands import app
 from perdure.cli.learn_zones import learnt_from
-from perdure.cli.main import app
 from perdure.files.log import RunLog
 from perdure.files.runs import RunFolder
 from perdure.files.zones import read_zones

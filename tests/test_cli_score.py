@@ -14,7 +14,7 @@ import pytest
 from worlds import two_apart
 
 import perdure
-from perdure.cli.main import run as run_command
+from perdure.cli.commands import run as run_command
 from perdure.cli.spreading import spread
 from perdure.comparison import Window, read_window
 from perdure.draw import Trails, paint

@@ -60,7 +60,7 @@ def test_the_slowest_kernel_is_compiled_by_a_second_process_or_where_it_cannot_k
 
 
 def test_help_loads_no_compiler():
-    code = "import sys; from perdure.cli.main import app; print('numba' in sys.modules)"
+    code = "import sys; from perdure.cli.commands import app; print('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
 
 

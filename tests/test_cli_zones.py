@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from worlds import two_apart
 
 import perdure
-from perdure.cli.main import app
+from perdure.cli.commands import app
 from perdure.draw import Trails, paint
 from perdure.draw.zones import COLOURS
 from perdure.errors import FormatError

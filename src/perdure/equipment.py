@@ -19,7 +19,7 @@ from perdure.types import Event
 T = TypeVar("T")
 
 AUTO, OWN = "auto", "default"
-USUAL = AUTO  # contexts where none is named: AUTO those that come with Perdure, OWN the tracker's own weights
+USUAL = OWN  # contexts where none is named: AUTO those that come with Perdure, OWN the tracker's own weights
 
 AnyContext = str | Path | Context
 

@@ -14,7 +14,7 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        from perdure.cli.main import run
+        from perdure.cli.commands import run
 
         code = run()
     except KeyboardInterrupt:
