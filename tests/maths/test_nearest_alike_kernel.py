@@ -11,7 +11,7 @@ def met(kernel, expected, reach, before, places, now, least):
     found, alike = np.full(len(expected), 7), np.full(len(expected), np.nan, np.float32)
     kernel(
         expected, reach, before, places, now, least, found, alike,
-        np.empty(len(places), np.int64), np.empty(len(places), np.float32),
+        np.empty(len(places), np.int64), np.empty(len(places), np.float32), np.empty(len(places), np.int64),
     )  # fmt: skip
     return found, alike
 

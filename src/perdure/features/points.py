@@ -148,8 +148,9 @@ class Trajectories:
         from perdure.maths.kernels.nearest_alike import nearest_alike
 
         found, alike = np.empty(len(self), np.int64), np.empty(len(self), np.float32)
-        finder, likest = np.empty(len(places), np.int64), np.empty(len(places), np.float32)
-        nearest_alike(expected, reach, self.looks, places, look, least, found, alike, finder, likest)
+        finder, squares = np.empty(len(places), np.int64), np.empty(len(places), np.int64)
+        likest = np.empty(len(places), np.float32)
+        nearest_alike(expected, reach, self.looks, places, look, least, found, alike, finder, likest, squares)
         return found, alike
 
     def gone_on(self, place: Float, look: Bytes, alike: Float, passed: Float, time: float) -> Trajectories:

@@ -26,6 +26,7 @@ Ints = NDArray[np.int64]
     changed(np.float32),
     changed(np.int64),
     changed(np.float32),
+    changed(np.int64),
 )
 def nearest_alike(
     expected: Float,
@@ -38,6 +39,7 @@ def nearest_alike(
     alike: Float,
     finder: Ints,
     likest: Float,
+    squares: Ints,
 ) -> None:
     """Write for each point which of the new ones it is: the likest within reach, if it is the likest for that one too.
 
@@ -59,11 +61,15 @@ def nearest_alike(
         The row of the new point; -1 for none.
     alike : (P,) float32, changed
         How alike the two are, in [0, 1]; 0 for none.
-    finder, likest : (N,) int64 and float32, changed
+    finder, likest, squares : (N,) int64, float32 and int64, changed
         Scratch.
     """
     for j in range(len(places)):
         finder[j], likest[j] = -1, -1.0
+        square = np.int32(0)
+        for one in range(now.shape[1]):
+            square += np.int32(now[j, one]) * np.int32(now[j, one])
+        squares[j] = square
     for i in range(len(expected)):
         found[i], alike[i] = -1, 0.0
         low, high = 0, len(places)  # the first new point that is not too far up
@@ -82,13 +88,12 @@ def nearest_alike(
                 break
             if across * across + down * down > reach[i] * reach[i]:
                 continue
-            both, other = np.int32(0), np.int32(0)
+            if own == 0 or squares[j] == 0:
+                continue
+            both = np.int32(0)
             for one in range(before.shape[1]):
                 both += np.int32(before[i, one]) * np.int32(now[j, one])
-                other += np.int32(now[j, one]) * np.int32(now[j, one])
-            if own == 0 or other == 0:
-                continue
-            cosine = np.float32(both / np.sqrt(float(own) * float(other)))
+            cosine = np.float32(both / np.sqrt(float(own) * float(squares[j])))
             if cosine < least:
                 continue
             if cosine > alike[i]:
@@ -111,6 +116,7 @@ def nearest_alike_twin(
     alike: Float,
     finder: Ints,
     likest: Float,
+    squares: Ints,
 ) -> None:
     """Do the same with every pair: the oracle of `nearest_alike`."""
     found[:], alike[:] = -1, 0.0
