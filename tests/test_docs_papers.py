@@ -26,6 +26,15 @@ PAPERS = {
         "§III, prediction",
         "§III, initialisation",
     ],
+    "multi-feature.md": [
+        *(f"eq. {number}" for number in range(1, 19)),
+        "§2.1.3",
+        "§2.1.5",
+        "§4.1",
+        "§4.3",
+        "§4.4",
+        "§6",
+    ],
     "track-and-cut.md": [*(f"eq. {number}" for number in range(1, 19)), "§3.3", "§3.4", "§4", "§6"],
 }
 

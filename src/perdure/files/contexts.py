@@ -1,4 +1,4 @@
-"""Learnt contexts in files: JSON with weights, levels, measures and training; docs/learning-contexts.md has an example.
+"""Learnt contexts in files: JSON with weights, levels, measures and training; docs/multi-feature.md has an example.
 
 All of it is checked when it is read; a fault names the file, the key, and what would do.
 """
