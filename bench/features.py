@@ -322,7 +322,6 @@ class Step(NamedTuple):
     weights: str
     ms: float
     slowest: float  # ms, of the slowest tenth the fastest
-    targets: int  # in the last frame
 
 
 def steps_of(film: Film) -> list[Step]:
@@ -343,17 +342,19 @@ def timed(film: Film, name: str, tracker: MultiFeature) -> Step:
         state, _ = tracker.step(state, frame, regions)
         spent.append(time.thread_time() - begun)
     counted = 1e3 * np.array(spent[WARM:])
-    width, height = film.scene.width, film.scene.height
-    given = f"{len(film.seen[-1][1])} boxes, {width}x{height}" if film.seen[-1][0].image is not None else ""
-    given = given or f"{len(film.seen[-1][1])} boxes, no pictures"
-    return Step(given, name, float(np.median(counted)), float(np.quantile(counted, 0.9)), len(state.targets))
+    boxes = float(np.mean([len(regions) for _, regions in film.seen]))
+    seen = "pictures" if film.seen[0][0].image is not None else "no pictures"
+    given = (
+        f"{len(state.targets)} targets, {boxes:.0f} boxes a frame, {film.scene.width}x{film.scene.height}, {seen}"
+    )
+    return Step(given, name, float(np.median(counted)), float(np.quantile(counted, 0.9)))
 
 
 def steps_table(steps: Sequence[Step]) -> Table:
     """A row for each film and set of weights."""
-    rows = [[one.given, one.weights, f"{one.ms:.1f}", f"{one.slowest:.1f}", str(one.targets)] for one in steps]
+    rows = [[one.given, one.weights, f"{one.ms:.1f}", f"{one.slowest:.1f}"] for one in steps]
     title = "steps: whole steps of `multifeature`"
-    return Table(title, ["given", "weights", "ms a frame", "9 of 10 within, ms", "targets"], rows)
+    return Table(title, ["given", "weights", "ms a frame", "9 of 10 within, ms"], rows)
 
 
 # The page ---------------------------------------------------------------------------------------------------

@@ -54,7 +54,8 @@ def test_costs_and_steps_are_laid_out(film: bench.Film):
     assert [row[0] for row in table.rows] == ["area", "the paper's eight"]
     step = bench.timed(film, "defaults", bench.MultiFeature())
     assert step.slowest >= step.ms > 0
-    assert step.targets <= 3
+    assert step.given.startswith("3 targets, ")
+    assert step.given.endswith("200x240, pictures")
     for one in (table, bench.steps_table([step])):
         assert {len(row) for row in one.rows} == {len(one.head)}
 

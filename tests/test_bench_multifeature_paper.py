@@ -59,9 +59,13 @@ def test_a_trial_is_followed_with_equal_weights_and_with_those_learnt_elsewhere(
     assert told["equal"]["features"] == 3, "displacement, shape and area: there are no pictures"
     assert told["learnt"]["M"] == 1.0, "whatever the weights, three people who are always seen are easy"
     assert told["learnt"]["tracks_TP"] == 3
+    ((_, _, weights),) = streets.learnt_weights()
     if setting == "paper":
-        ((_, _, weights),) = streets.learnt_weights()
         assert set(weights) <= set(PAPER)
+        assert both.fitted is None, "Th1 is the same for all"
+    else:
+        assert both.further == both.learnt.figures["M"] - both.fitted.figures["M"]
+        assert streets.context(setting, bench.FITTED, (view("here"),)).weights == dict.fromkeys(PAPER, 1.0)
 
 
 def test_halves_are_the_frames_before_and_from_the_middle(streets: bench.Bench):
@@ -103,13 +107,18 @@ def test_tables_say_on_how_many_trials_learning_helps():
         "halves: as the paper has it; learning raises M on 1 of 2 and takes less time on 1"
     )
     assert [row[-1] for row in one.rows] == ["", "+25.0", "", "+0.0"]
+    fitted = bench.table_1(
+        "halves", "defaults", [bench.Both(trial, run(0.5, 4.0), run(0.75, 3.0), run(0.75, 3.0))]
+    )
+    assert "M on 1 of 1 (weights beyond Th1 on 0) and" in fitted.title
+    assert [row[-1] for row in fitted.rows] == ["", "+25.0", "+25.0"]
     three = bench.table_3("defaults", found)
     assert three.rows[-1] == ["all", "8", *["4"] * 6]
     two = bench.table_2(
         [{"clip": "x", "ours": {"equal": 0.5, "learnt": 0.6, "built in": 0.4}, "peers": {"p": 0.7}}]
     )
     assert two.rows == [["x", "60.0", "40.0", "50.0", "**70.0**"]]
-    for table in (one, two, three):
+    for table in (one, fitted, two, three):
         assert {len(row) for row in table.rows} == {len(table.head)}
 
 
