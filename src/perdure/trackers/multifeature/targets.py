@@ -62,6 +62,8 @@ class Targets:
     def take(self, index: ArrayLike) -> Targets:
         """Return the named rows (indices or a bool array), in that order."""
         index = np.asarray(index)
+        if index.dtype == np.bool_ and index.all():
+            return self
         return Targets(
             **{one.name: _each(getattr(self, one.name), lambda part: part[index]) for one in fields(self)}
         )
@@ -93,6 +95,8 @@ class Targets:
 
     def join(self, other: Targets) -> Targets:
         """Return these and the others behind them."""
+        if not len(other):
+            return self
         return Targets(
             **{one.name: _joined(getattr(self, one.name), getattr(other, one.name)) for one in fields(self)}
         )
