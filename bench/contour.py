@@ -46,7 +46,7 @@ from perdure.files.mask_pngs import read_indices
 from perdure.files.video import open_source
 from perdure.files.whole import whole_file
 from perdure.maths import levelset, lie
-from perdure.trackers.contour import Contour, measuring, observer, tracker
+from perdure.trackers.contour import Contour, births, looking, measuring, observer, tracker, updating
 from perdure.types import Bits, Frame, Mask, Regions, Scene
 
 PARTS = ("updates", "length", "area", "stages")
@@ -287,13 +287,13 @@ STAGES: dict[
     str, tuple[tuple[Any, str], ...]
 ] = {  # stage -> where its functions are looked up, and their names there
     "place and camera": tuple((tracker, name) for name in ("lab_of", "small_grey", "moved_on", "learnt_place")),
-    "flow": ((tracker, "velocity_by_flow"),),
-    "evidence": ((tracker, "evidence"),),
-    "search": ((Contour, "_shifted"),),
-    "registration": ((Contour, "_registered"),),
-    "update": ((Contour, "_observed"),),
-    "looks": ((Contour, "_learnt"),),
-    "silhouettes": ((Contour, "_silhouette"),),
+    "flow": ((looking, "velocity_by_flow"),),
+    "evidence": ((looking, "evidence"),),
+    "search": ((looking, "_shifted"),),
+    "registration": ((looking, "registered"),),
+    "update": ((updating, "observed"),),
+    "looks": ((updating, "_learnt"),),
+    "silhouettes": tuple((room, "silhouette_of") for room in (births, looking, tracker)),
     "saying": ((tracker, "rows_of"),),
 }
 
