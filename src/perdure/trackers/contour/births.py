@@ -136,7 +136,7 @@ def _newborn(
     layer = learnt_layer(None, window, colours, (depth < -0.5) & within, pose, 1.0)
     return Target(
         key, identity, state, Looks(inner, outer, inner, outer, layer), mask, 1.0, float(mask.area),
-        np.zeros(group.dimension), (), -1, 2 * RESTLESS, np.zeros(2), 0, 1, 0.0, time,
+        np.zeros(group.dimension), (), -1, 2 * RESTLESS, np.zeros(2), np.zeros(2), 0, 1, 0.0, time,
         float(regions.scores[row]), str(regions.classes[row]), (row,),
         bool(regions.data["mark"][row]) if "mark" in regions.data else False,
     )  # fmt: skip

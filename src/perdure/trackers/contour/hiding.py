@@ -20,6 +20,7 @@ from perdure.types import Bits, Mask
 _MISSING = 0.15  # what a pixel of a silhouette counts that does not look like it, beside one that does
 _STRAY = 0.03  # what the farthest shift must cover more, of all
 _DRIFT = 0.4  # rate at which the path of a hidden object follows what is seen of it
+_STRAYING = 0.06  # rate at which its velocity does
 _SOLID = 5  # cells across, from which a part is one
 _FORGOTTEN = 0.015  # rate at which the usual support of what is partly hidden is forgotten
 
@@ -33,7 +34,7 @@ def placed(by: Rules, target: Target, expected: Expected, sight: Seen, one: Meas
     for pose in poses:
         depth = sight.window.drawn(expected.shape, pose)
         near = by.searched(target) / 2 + 1
-        x, y = covering(depth, one.pull, int(near / one.step), by.reach)
+        x, y = covering(depth, one.pull, int(near / one.step), by.reach, sight.covered)
         moved = pose.copy()
         moved[:2, 2] += np.array([x, y]) * one.step
         depth = sight.window.drawn(expected.shape, moved)
@@ -72,14 +73,22 @@ def hidden(
     pose = observer.pose_of(state, by.group)
     depth = sight.window.drawn(state.shape, pose)
     seen = Mask.empty() if gone else mask_of(sight.window, (depth < 0) & (one.pull < 0))
-    drift = (np.zeros(2) if target.visible >= WHOLE else target.drift) + (
-        0.0 if gone else _DRIFT * (place[:2, 2] - expected.pose[:2, 2])
-    )
+    drift, straying = straying_of(target, np.zeros(2) if gone else place[:2, 2] - expected.pose[:2, 2])
     return replace(
-        target, state=state, seen=seen, visible=visible, recalled=expected.recalled, drift=drift,
+        target, state=state, seen=seen, visible=visible, recalled=expected.recalled, drift=drift, straying=straying,
         usual=target.usual * (1 - _FORGOTTEN) if visible > 0.5 else target.usual,
         missed=target.missed + waited if gone else 0.0, links=(), age=target.age + 1,
     )  # fmt: skip
+
+
+def straying_of(target: Target, off: Float) -> tuple[Float, Float]:
+    """Return how far (2,) px a hidden object is off its path, and by how much (2,) px/frame more in every frame.
+
+    It is found `off` (2,) px where it was expected: it may have slowed down or sped up since it was seen whole.
+    """
+    since = 0.0 if target.visible >= WHOLE else 1.0
+    straying = since * target.straying + _STRAYING * off
+    return since * target.drift + straying + _DRIFT * off, straying
 
 
 def holding(by: Rules, target: Target, state: State, sight: Seen, one: Measured) -> State:
@@ -105,10 +114,11 @@ def _with_parts(by: Rules, state: State, sight: Seen, parts: Bits) -> State:
     return observer.gauged(replace(state, shape=shape), group=by.group)
 
 
-def covering(depth: Float, pull: Single, most: int, reach: int) -> tuple[int, int]:
+def covering(depth: Float, pull: Single, most: int, reach: int, covered: Bits) -> tuple[int, int]:
     """Return the shift (x, y), of at most so many cells, at which a silhouette covers most of what looks like it.
 
-    What of it does not look like it counts little: it may be hidden.
+    What of it does not look like it counts little, since it may be hidden; but in full where objects have been seen
+    before (h, w), since nothing stands there that could hide it.
     """
     most = max(most, 1)
     inside = (depth < 0).astype(np.float32)
@@ -116,7 +126,8 @@ def covering(depth: Float, pull: Single, most: int, reach: int) -> tuple[int, in
     if not len(rows):
         return 0, 0
     part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    gain = np.where(pull < 0, -pull, np.float32(-_MISSING) * pull) * (depth < most + reach)
+    amiss = np.where(covered, np.float32(1), np.float32(_MISSING))
+    gain = np.where(pull < 0, -pull, -amiss * pull) * (depth < most + reach)
     field = cv2.copyMakeBorder(gain.astype(np.float32), most, most, most, most, cv2.BORDER_CONSTANT, value=0)
     field = field[part[0].start : part[0].stop + 2 * most, part[1].start : part[1].stop + 2 * most]
     sums = cv2.matchTemplate(field, np.ascontiguousarray(inside[part]), cv2.TM_CCORR) / float(inside.sum())

@@ -53,6 +53,7 @@ class Target:
     recalled: int  # while it is hidden: how old it was when it had the shape that it has now; -1: it is rigid
     restless: float  # share of its outline that is another in every frame, of late
     drift: NDArray[np.float64]  # (2,) px by which it was found off its path since it is hidden
+    straying: NDArray[np.float64]  # (2,) px/frame by which that grows
     age: int  # frames since it was found
     frames: int  # in which it was measured
     missed: float  # s for which it was not seen

@@ -109,7 +109,7 @@ def _found(
     return replace(
         target, state=state, looks=looks, seen=mask_of(sight.window, seen), visible=visible,
         usual=target.usual + (_MORE if area > target.usual else _LESS) * (area - target.usual),
-        steady=steady, past=past, recalled=-1, restless=restless, drift=np.zeros(2),
+        steady=steady, past=past, recalled=-1, restless=restless, drift=np.zeros(2), straying=np.zeros(2),
         age=target.age + 1, missed=0.0, frames=target.frames + 1, links=(),
     )  # fmt: skip
 
