@@ -44,19 +44,26 @@ def test_what_is_seen_of_one_who_slows_down_tells_how_fast_she_goes_on():
     expected, true = 0.0, 0.0
     for _ in range(30):
         true -= 2.0  # px/frame, slower than on her path
-        drift, straying = straying_of(target, np.array([true - expected, 0.0]))
+        drift, straying = straying_of(target, np.array([true - expected, 0.0]), 1.0)
         target = replace(target, drift=drift, straying=straying)
         expected = drift[0]
     np.testing.assert_allclose(straying, (-2.0, 0.0), atol=0.1)
     for _ in range(10):  # hidden
         true -= 2.0
-        drift, straying = straying_of(target, np.zeros(2))
+        drift, straying = straying_of(target, np.zeros(2), 0.0)
         target = replace(target, drift=drift, straying=straying)
     assert abs(drift[0] - true) < 4
 
 
 def test_a_path_is_believed_anew_by_who_was_seen_whole():
     target = replace(found(), visible=1.0, drift=np.full(2, 9.0), straying=np.full(2, 3.0))
-    drift, straying = straying_of(target, np.zeros(2))
+    drift, straying = straying_of(target, np.zeros(2), 1.0)
     assert not drift.any()
     assert not straying.any()
+
+
+def test_who_is_not_seen_is_held_where_she_can_be_at_the_speed_that_she_had():
+    target = replace(found(), visible=0.0, drift=np.zeros(2), straying=np.array([-1.0, 0.0]))
+    drift, straying = straying_of(target, np.array([-5.0, 0.0]), 0.0)
+    assert drift[0] < -1  # farther off her path than her speed alone would have her
+    np.testing.assert_array_equal(straying, target.straying)

@@ -73,7 +73,7 @@ def hidden(
     pose = observer.pose_of(state, by.group)
     depth = sight.window.drawn(state.shape, pose)
     seen = Mask.empty() if gone else mask_of(sight.window, (depth < 0) & (one.pull < 0))
-    drift, straying = straying_of(target, np.zeros(2) if gone else place[:2, 2] - expected.pose[:2, 2])
+    drift, straying = straying_of(target, place[:2, 2] - expected.pose[:2, 2], 0.0 if gone else 1.0)
     return replace(
         target, state=state, seen=seen, visible=visible, recalled=expected.recalled, drift=drift, straying=straying,
         usual=target.usual * (1 - _FORGOTTEN) if visible > 0.5 else target.usual,
@@ -81,13 +81,14 @@ def hidden(
     )  # fmt: skip
 
 
-def straying_of(target: Target, off: Float) -> tuple[Float, Float]:
+def straying_of(target: Target, off: Float, told: float) -> tuple[Float, Float]:
     """Return how far (2,) px a hidden object is off its path, and by how much (2,) px/frame more in every frame.
 
-    It is found `off` (2,) px where it was expected: it may have slowed down or sped up since it was seen whole.
+    It is found `off` (2,) px where it was expected: it may have slowed down or sped up since it was seen whole. That is
+    believed of its speed as far as something is `told` in [0, 1]: of one who is not seen it only says where she can be.
     """
     since = 0.0 if target.visible >= WHOLE else 1.0
-    straying = since * target.straying + _STRAYING * off
+    straying = since * target.straying + told * _STRAYING * off
     return since * target.drift + straying + _DRIFT * off, straying
 
 
