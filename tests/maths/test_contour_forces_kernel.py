@@ -15,7 +15,7 @@ def test_the_kernel_of_forces_and_its_twin_agree(size: int):
     edges[7, 2:] = edges[7, :2]  # a point
     pose = np.array([[1.1, 0.2, 30.0], [-0.1, 0.9, 25.0], [0, 0, 1]])
     to_field = np.array([[0.5, 0, -2.0], [0, 0.5, -1.0], [0, 0, 1]])
-    field, less = rng.uniform(-1, 1, (30, 40)), rng.uniform(-0.3, 0.3, 60)
+    field, less = rng.uniform(-1, 1, (30, 40)).astype(np.float32), rng.uniform(-0.3, 0.3, 60)
     sums = []
     for one in (contour_forces, contour_forces_twin):
         slope, seen, every = np.empty(size), np.empty((size, size)), np.empty((size, size))

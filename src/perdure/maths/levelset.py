@@ -375,10 +375,9 @@ def _whole(near: _Band) -> Float:
 def _crossed(phi: Float) -> NDArray[np.int64]:
     """Flat places of the pixels whose cell, to the right and down, the contour crosses."""
     below = phi < 0
-    corners = below[:-1, :-1], below[:-1, 1:], below[1:, 1:], below[1:, :-1]
-    some, every = np.logical_or.reduce(corners), np.logical_and.reduce(corners)
+    across = below[:, :-1] != below[:, 1:]
     crossed = np.zeros(phi.shape, np.bool_)
-    crossed[:-1, :-1] = some & ~every
+    crossed[:-1, :-1] = across[:-1] | across[1:] | (below[:-1, :-1] != below[1:, :-1])
     return np.flatnonzero(crossed)
 
 

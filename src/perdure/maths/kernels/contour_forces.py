@@ -9,12 +9,13 @@ from perdure.maths.kernels.compile import changed, given, kernel_for, part
 from perdure.maths.kernels.narrow_band import value_at
 
 Float = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 
 @kernel_for(
     given(np.float64, 2, "C"),
     given(np.float64, 2, "C"),
-    given(np.float64, 2, "C"),
+    given(np.float32, 2, "C"),
     given(np.float64, 2, "C"),
     given(np.float64),
     float,
@@ -25,7 +26,7 @@ Float = NDArray[np.float64]
 def forces(
     edges: Float,
     pose: Float,
-    field: Float,
+    field: Single,
     to_field: Float,
     less: Float,
     most: float,
@@ -41,7 +42,7 @@ def forces(
         x, y, x, y of begin and end; the inside lies to the right of the way, as seen with y downwards.
     pose : (3, 3) float64
         Takes them into the picture. Motions turn about where it takes (0, 0).
-    field : (H, W) float64
+    field : (H, W) float32
         What is summed at the middle of each edge.
     to_field : (3, 3) float64
         From the picture to the field's columns and rows; beyond the field, its border counts.

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from perdure.maths import levelset, lie
 
 Float = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 
 def forces(
     edges: Float,
     pose: Float,
-    field: Float,
+    field: Single,
     to_field: Float,
     less: Float,
     most: float,

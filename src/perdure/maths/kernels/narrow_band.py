@@ -357,7 +357,7 @@ def carry(phi: Float, back: Float, scale: float, out: Float) -> None:
 
 
 @part
-def value_at(field: Float, x: float, y: float) -> float:
+def value_at(field: NDArray[np.floating], x: float, y: float) -> float:
     """The bilinear value at a point, or at the point of the picture that is nearest to it."""
     height, width = field.shape
     x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.maths import levelset, lie
-from perdure.trackers.contour.measuring import Measured
+from perdure.trackers.contour.measuring import Measured, Single
 
 Float = NDArray[np.float64]
 Motion = Callable[[Float], Float]  # velocities of the window (k, D), the newest last -> the next one (D,)
@@ -426,7 +426,7 @@ def _next_window(
 def _forces(
     edges: Float,
     pose: Float,
-    field: NDArray[np.floating],
+    field: Single,
     one: Measured,
     less: Float,
     group: lie.Group,
@@ -437,7 +437,7 @@ def _forces(
 
     size = group.dimension
     slope, heard, whole = np.empty(size), np.empty((size, size)), np.empty((size, size))
-    forces(edges, pose, np.ascontiguousarray(field, np.float64), one.to_cells(), less, most, slope, heard, whole)
+    forces(edges, pose, np.ascontiguousarray(field), one.to_cells(), less, most, slope, heard, whole)
     return slope, heard, whole
 
 
