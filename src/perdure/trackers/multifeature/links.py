@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from perdure.features.feature import Feature, Float
 from perdure.features.pool import known
 from perdure.scene.context import Context
 from perdure.trackers.multifeature.targets import Rows, Targets, is_number
+from perdure.types import Frame, Regions, Scene
 
 Index = NDArray[np.intp]
 _LEAST = 0.05  # deviation of a similarity below which none is believed (eq. 15)
@@ -110,3 +111,19 @@ def long_term(targets: Targets, one: Index, name: str, new: Float, alike: Float)
     deviation = np.maximum(spread, floor)
     off = (value - mean[one]) / deviation[one]
     return np.asarray(np.exp(-0.5 * off**2) * targets.length[one], np.float32)
+
+
+def described(
+    features: list[Feature],
+    memories: Mapping[str, Mapping[str, NDArray[Any]]],
+    frame: Frame,
+    regions: Regions,
+    scene: Scene,
+) -> tuple[dict[str, dict[str, NDArray[Any]]], Rows]:
+    """Return what features carry on, and the rows of all regions by feature; one that is new begins here."""
+    carried, rows = {}, {}
+    for one in features:
+        before = memories[one.name] if one.name in memories else one.start(scene)
+        memory, rows[one.name] = one.describe(before, frame, regions)
+        carried[one.name] = dict(memory)
+    return carried, rows

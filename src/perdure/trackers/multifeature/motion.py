@@ -9,8 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from perdure.features.feature import Float
 from perdure.trackers.multifeature.targets import Rows, Targets
+from perdure.types import Boxes, Regions
 
+Index = NDArray[np.intp]
 Wide = NDArray[np.float64]
 
 
@@ -46,3 +49,19 @@ def expected(targets: Targets, time: float, inertia: float, steady: float, smoot
         row = (start + rate * ahead[:, None]).reshape(places[:, -1].shape)
         found[name] = row.astype(np.float32)
     return found
+
+
+def surprise(targets: Targets, pairs: Index, where: Boxes, regions: Regions) -> Wide:
+    """Return how far (N, 2) each target is from where it was expected, in its sizes; NaN where it is not seen for sure."""
+    found = np.full((len(targets), 2), np.nan)
+    rows, columns = pairs[targets.missed[pairs[:, 0]] == 0].T
+    expected, seen = where[rows], regions.boxes[columns]
+    size = np.maximum(expected[:, 2:] - expected[:, :2], 1.0)
+    found[rows] = (seen[:, :2] + seen[:, 2:] - expected[:, :2] - expected[:, 2:]) / 2 / size
+    return found
+
+
+def boxes_of(places: Float) -> Boxes:
+    """Return boxes (N, 4) of centres and sizes (N, 4)."""
+    half = np.maximum(places[:, 2:4], 0.0) / 2
+    return np.concatenate([places[:, :2] - half, places[:, :2] + half], axis=1)

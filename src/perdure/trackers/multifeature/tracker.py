@@ -1,8 +1,19 @@
-"""The multi-feature tracker: links by many features over a window, weighed as the context has taught."""
+"""The multi-feature tracker (Chau, Brémond & Thonnat, *A multi-feature tracking algorithm enabling adaptation to context
+variations*, 2011): what is detected is linked by many features at once, weighed as the context has taught.
+
+An object links to the trajectories of the last T2 seconds whose last object is alike enough (eq. 10, Th1). Of these
+links the globally most similar become official: what the object is like now and what the trajectory was like over its
+last Q objects both count (eq. 15-18). Who makes no link for T2 is let go, and what lives shortly or comes no way is
+noise (section 4.4).
+
+Where we depart: places are carried on along the trajectory before they are compared (`motion`); overlap is a feature;
+regions of low score get a second look; boxes without silhouettes are cut to what moves (`moving`); who met somebody is
+judged once more by looks when they have parted (`exchanging`), and who was lost is found again by them, long after T2
+(`recalling`); how looks of one and of two differ is learnt from the film itself.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -13,7 +24,6 @@ from numpy.typing import NDArray
 from perdure.features.embedding import Network
 from perdure.features.feature import Feature, Float
 from perdure.features.pool import known
-from perdure.maths.assign import assign
 from perdure.maths.jitter import Jitter
 from perdure.maths.jitter import learnt as surprised
 from perdure.params import parameter
@@ -26,13 +36,14 @@ from perdure.scene.zones import FORBIDDEN, Zones, counting, renumbered
 from perdure.trackers.multifeature.exchanging import Exchanged, Meetings, exchange, in_doubt, met
 from perdure.trackers.multifeature.explaining import explained, restated
 from perdure.trackers.multifeature.fathers import ASSIGNMENTS
-from perdure.trackers.multifeature.links import Links, compare, global_similarity, weighted
-from perdure.trackers.multifeature.motion import expected
+from perdure.trackers.multifeature.links import Links, compare, described, global_similarity, weighted
+from perdure.trackers.multifeature.motion import boxes_of, expected, surprise
 from perdure.trackers.multifeature.moving import learnt, moving
 from perdure.trackers.multifeature.recalling import Recalled, Telling, looked, recall, within
 from perdure.trackers.multifeature.saying import Moment, between, event, rekeyed, say
 from perdure.trackers.multifeature.targets import NEVER, Rows, Targets, extended, newborn
 from perdure.trackers.multifeature.weights import DEFAULT, GATE, features_for, looks_for, weights_of
+from perdure.trackers.multifeature.zoning import by_zones, hidden_behind
 from perdure.types import Boxes, Event, Frame, Regions, Report, Scene, Tracks
 
 Index = NDArray[np.intp]
@@ -165,7 +176,7 @@ class MultiFeature:
         shapes = {one.name: one.describe({}, nobody, nothing)[1].shape[1:] for one in looks}
         features = features_for(self.in_force(""), known, self.network)
         memories = {one.name: dict(one.start(known)) for one in features}
-        _, rows = _described(features, memories, nobody, nothing, known)
+        _, rows = described(features, memories, nobody, nothing, known)
         return MultiFeatureState(
             targets=newborn(nobody, nothing, rows, features, shapes, 1, objects),
             memories=memories,
@@ -233,39 +244,28 @@ class MultiFeature:
         context = self.in_force(state.context)
         features = features_for(context, scene, self.network)
         seen, backdrop = self._moving(state, regions, frame)
-        memories, rows = _described(features, state.memories, frame, seen, scene)
+        memories, rows = described(features, state.memories, frame, seen, scene)
         state = replace(state, targets=state.targets.described_by(features, rows))
         places = expected(state.targets, frame.time, self.inertia, self.believed_after)
-        where = _boxes(places[GATE])
-        onward = _boxes(expected(state.targets, frame.time, self.inertia, self.believed_after, 0.0)[GATE])
+        where = boxes_of(places[GATE])
+        onward = boxes_of(expected(state.targets, frame.time, self.inertia, self.believed_after, 0.0)[GATE])
         links = self._links(state.targets, features, places, regions, rows, frame, context, zones)
         score = self._scores(links, state, where, regions, frame, context)
         pairs = self._official(state, score, regions, frame)
         told = explained(state.targets, links, score, pairs, regions, context) if self.explain else ()
         targets, again = self._followed(state, links, pairs, regions, rows, frame)
-        smooth = _boxes(expected(targets, frame.time, self.inertia, self.believed_after, 1.0)[GATE])
-        targets = targets.replace(surprise=_surprise(state.targets, pairs, onward, regions))
+        smooth = boxes_of(expected(targets, frame.time, self.inertia, self.believed_after, 1.0)[GATE])
+        targets = targets.replace(surprise=surprise(state.targets, pairs, onward, regions))
         jitter = surprised(state.jitter, targets.surprise, state.targets.surprise)
         gaps = between(state.targets, targets, pairs[:, 0], frame, self.fill)
         region = np.full(len(targets), -1)
         region[pairs[:, 0]] = pairs[:, 1]
-        targets, hidden = _hidden(zones, targets, region, where, frame)
+        targets, hidden = hidden_behind(zones, targets, region, where, frame)
         births = self._births(zones, regions, pairs[:, 1])
         targets = targets.join(self._new(state, features, births, regions, rows, frame))
         region, where = np.concatenate([region, births]), np.concatenate([where, regions.boxes[births]])
         smooth = np.concatenate([smooth, regions.boxes[births]])
-        telling, found = state.telling, Recalled.nobody(targets)
-        meetings, swapped = state.meetings, Exchanged(targets, state.meetings, {}, (), ())
-        if frame.image is not None:
-            kinds = looks_for(scene, self.network)
-            doubt = in_doubt(targets, state.meetings)
-            targets, telling, fresh = looked(kinds, targets, region, telling, frame, seen, state.size, doubt)
-            active = targets.missed <= self.window + 1e-9
-            meetings = met(state.meetings, targets, where, active, frame)
-            swapped = exchange(kinds, telling, targets, meetings, fresh, frame, self.exchange)
-            targets, meetings = swapped.targets, swapped.meetings
-            limits = (self.recall, self.likeness)
-            found = recall(kinds, telling, targets, region, fresh, frame, state.size, zones, limits)
+        telling, meetings, swapped, found = self._known_again(state, targets, region, where, seen, frame, scene)
         known_as = dict(
             zip(state.targets.ids.tolist(), found.targets.ids.tolist(), strict=False)
         )  # but for newborn ones
@@ -297,6 +297,30 @@ class MultiFeature:
             events=events,
             explanations=restated(told, known_as),
         )
+
+    def _known_again(
+        self,
+        state: MultiFeatureState,
+        targets: Targets,
+        region: Index,
+        where: Boxes,
+        seen: Regions,
+        frame: Frame,
+        scene: Scene,
+    ) -> tuple[Telling, Meetings, Exchanged, Recalled]:
+        """Judge by looks who has changed places with whom, and who was lost before; nothing without a picture."""
+        swapped = Exchanged(targets, state.meetings, {}, (), ())
+        if frame.image is None:
+            return state.telling, state.meetings, swapped, Recalled.nobody(targets)
+        kinds = looks_for(scene, self.network)
+        doubt = in_doubt(targets, state.meetings)
+        targets, telling, fresh = looked(kinds, targets, region, state.telling, frame, seen, state.size, doubt)
+        active = targets.missed <= self.window + 1e-9
+        meetings = met(state.meetings, targets, where, active, frame)
+        swapped = exchange(kinds, telling, targets, meetings, fresh, frame, self.exchange)
+        limits = (self.recall, self.likeness)
+        found = recall(kinds, telling, swapped.targets, region, fresh, frame, state.size, state.zones, limits)
+        return telling, swapped.meetings, swapped, found
 
     def finish(self, state: MultiFeatureState) -> Report:
         """Return what is left to say: nothing."""
@@ -368,7 +392,7 @@ class MultiFeature:
             second[pairs[:, 0]] = -np.inf
             second[state.targets.missed > _LATELY] = -np.inf
             pairs = np.concatenate([pairs, chosen(second)])
-        return np.concatenate([pairs, _by_zones(state, pairs, regions, frame)])
+        return np.concatenate([pairs, by_zones(state.zones, state.targets, pairs, regions, frame)])
 
     def _followed(
         self, state: MultiFeatureState, links: Links, pairs: Index, regions: Regions, rows: Rows, frame: Frame
@@ -437,67 +461,3 @@ _OBJECTS = (4, 60)  # at least and at most so many objects of a trajectory are a
 _FIRST_CHECK = 2.0  # s after which a context is first chosen
 _NEARER = 0.3  # by so much another context must be nearer to take over
 _LATELY = 0.2  # s: who was seen so lately may be in a region of low score
-
-
-def _described(
-    features: list[Feature],
-    memories: Mapping[str, Mapping[str, NDArray[Any]]],
-    frame: Frame,
-    regions: Regions,
-    scene: Scene,
-) -> tuple[dict[str, dict[str, NDArray[Any]]], Rows]:
-    """What features carry on, and the rows of all regions by feature; one that is new begins here."""
-    carried, rows = {}, {}
-    for one in features:
-        before = memories[one.name] if one.name in memories else one.start(scene)
-        memory, rows[one.name] = one.describe(before, frame, regions)
-        carried[one.name] = dict(memory)
-    return carried, rows
-
-
-def _surprise(targets: Targets, pairs: Index, where: Boxes, regions: Regions) -> NDArray[np.float64]:
-    """How far (N, 2) each target is from where it was expected, in its sizes; NaN where it is not seen for sure."""
-    found = np.full((len(targets), 2), np.nan)
-    rows, columns = pairs[targets.missed[pairs[:, 0]] == 0].T
-    expected, seen = where[rows], regions.boxes[columns]
-    size = np.maximum(expected[:, 2:] - expected[:, :2], 1.0)
-    found[rows] = (seen[:, :2] + seen[:, 2:] - expected[:, :2] - expected[:, 2:]) / 2 / size
-    return found
-
-
-def _boxes(places: Float) -> Boxes:
-    """Boxes (N, 4) of centres and sizes (N, 4)."""
-    half = np.maximum(places[:, 2:4], 0.0) / 2
-    return np.concatenate([places[:, :2] - half, places[:, :2] + half], axis=1)
-
-
-def _by_zones(state: MultiFeatureState, pairs: Index, regions: Regions, frame: Frame) -> Index:
-    """Return links (K, 2) of lost targets to what an occluder or a rule lets expect, of what is left over."""
-    targets, zones = state.targets, state.zones
-    lost = np.setdiff1d(np.flatnonzero((targets.missed > 0) & (targets.ids > 0)), pairs[:, 0])
-    free = np.setdiff1d(np.arange(len(regions)), pairs[:, 1])
-    if not zones or not len(lost) or not len(free):
-        return np.zeros((0, 2), np.intp)
-    gaps = np.repeat(frame.time - targets.seen[lost][:, None], len(free), axis=1)
-    cost = zones.returning(targets.last[lost], targets.behind[lost], regions.boxes[free], gaps)
-    found = assign(cost).pairs
-    return np.column_stack([lost[found[:, 0]], free[found[:, 1]]])
-
-
-def _hidden(
-    zones: Zones, targets: Targets, region: Index, where: Boxes, frame: Frame
-) -> tuple[Targets, list[Event]]:
-    """Note who has got behind an occluder, and who is seen again."""
-    if not zones.has("occlusion") and not zones.rules:
-        return targets, []
-    away = region < 0
-    lost = np.flatnonzero(away & (targets.behind < 0))
-    behind = np.where(away, targets.behind, -1)
-    behind[lost] = zones.behind(targets.last[lost], where[lost])
-    changes = (("occluded", behind, targets.behind), ("found_again", targets.behind, behind))
-    events = [
-        event(kind, frame, int(targets.ids[row]), zones.name(int(one[row])))
-        for kind, one, other in changes
-        for row in np.flatnonzero((one >= 0) & (other < 0) & (targets.ids > 0))
-    ]
-    return targets.replace(behind=behind), events
