@@ -130,6 +130,14 @@ def test_settling_leaves_one_row_per_frame_and_id_and_twice_changes_nothing(kind
 
 
 @every_world
+def test_no_correction_makes_two_seen_rows_of_a_frame_one(kind, world: World):
+    reports = told(kind, world)
+    dropped = any(report.dropped for report in reports)
+    seen = sum(int((~report.rows.inferred).sum()) for report in reports)
+    assert dropped or int((~settle(reports).inferred).sum()) == seen
+
+
+@every_world
 def test_step_changes_neither_frame_nor_regions(kind, world: World):
     tracker = kind()
     state = tracker.start(world.scene)

@@ -118,6 +118,28 @@ def test_two_who_were_mistaken_for_each_other_change_their_ids_back_by_their_loo
     assert named == rows, "reasons are told under the ids that the rows of their report have"
 
 
+TURNING = {  # pixels a frame, frame of turning, upper side, left side at first: of each who walks there and back
+    "three": [(3, 23, 38, 11), (-3, 24, 34, 149), (2, 17, 37, 35)],
+    "four, two by two": [(-2, 20, 34, 117), (-3, 19, 30, 135), (2, 26, 34, 26), (-2, 19, 28, 119)],
+    "four, one after another": [(-3, 24, 39, 143), (3, 22, 33, 7), (-4, 21, 39, 160), (-3, 20, 35, 129)],
+    "three, one after another": [(-4, 20, 40, 156), (2, 20, 36, 38), (-3, 22, 35, 135)],
+}
+
+
+@pytest.mark.parametrize("walks", TURNING.values(), ids=list(TURNING))
+def test_of_several_who_change_their_ids_no_two_become_one_in_any_frame(walks: list[tuple[int, int, int, int]]):
+    def there_and_back(step: int, turn: int, top: int, left: int):
+        return lambda k: (left + step * (k if k < turn else 2 * turn - k), top)
+
+    colours = (RED, BLUE, GREEN, (220, 200, 40))
+    blocks = tuple(Block(there_and_back(*one), colour=colour) for one, colour in zip(walks, colours, strict=False))
+    world = World(blocks, count=60, width=170)
+    reports = reported(boxed(world), world.scene, weights="displacement_2d=1")
+    assert "exchanged" in kinds(reports)
+    seen = sum(int((~report.rows.inferred).sum()) for report in reports)
+    assert int((~settle(reports).inferred).sum()) == seen
+
+
 def lost_for_five_seconds(colour: tuple[int, int, int]) -> World:
     """One red, lost inside the picture for 5 s; then one of a colour nearby, and another all the time."""
     return World(

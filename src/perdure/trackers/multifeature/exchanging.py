@@ -58,7 +58,7 @@ class Exchanged(NamedTuple):
 
     targets: Targets
     meetings: Meetings
-    keys: dict[int, int]  # of who has turned out to be whom, and had no id
+    keys: dict[int, int]  # of who has turned out to be whom
     renamed: tuple[Renamed, ...]
     events: tuple[Event, ...]
 
@@ -127,6 +127,7 @@ class _Company(NamedTuple):
 
     bodies: Index  # (B,) rows of targets that are seen, and were by themselves since
     identities: Index  # (I,) rows of targets whose looks are known from before
+    newborn: frozenset[int]  # rows of bodies that were seen first when they parted
     odds: NDArray[np.float64]  # (I, B) how likely each is each, in nats; -inf where it cannot be
     own: NDArray[np.float64]  # (B,) the same of each body and its present identity
 
@@ -150,7 +151,7 @@ def _judged(
     gain = float(company.odds[identity, body].sum() - company.own.sum())
     if len(chosen) < len(company.bodies) or not changed or gain < sure + _MORE * (len(changed) - 1):
         return found
-    return _given(found, changed, spans, members, frame, gain)
+    return _given(found, changed, company, spans, members, frame, gain)
 
 
 def _likely(
@@ -178,7 +179,7 @@ def _likely(
         numbers = alike(kinds, looks[0], before[mine], looks[1], after[theirs]).astype(np.float64)
         odds[one, other] = log_odds(telling.same, telling.other, numbers)
     own = np.array([odds[identities == body, number].sum() for number, body in enumerate(bodies.tolist())])
-    return _Company(members[bodies], members[identities], odds, own)
+    return _Company(members[bodies], members[identities], frozenset(members[newborn].tolist()), odds, own)
 
 
 class _Spans(NamedTuple):
@@ -198,38 +199,59 @@ def _spans(targets: Targets, meetings: Meetings, members: Index) -> _Spans:
 
 
 def _given(
-    found: Exchanged, changed: dict[int, int], spans: _Spans, members: Index, frame: Frame, gain: float
+    found: Exchanged,
+    changed: dict[int, int],
+    company: _Company,
+    spans: _Spans,
+    members: Index,
+    frame: Frame,
+    gain: float,
+
 ) -> Exchanged:
-    """The targets, whose bodies have the identities `changed` gives them, body to identity."""
-    targets = found.targets
+    """The targets, whose bodies have the identities `changed` gives them, body to identity.
+
+    All change in one frame, so that no two are one in any; where one without a name would have to take part in
+    that otherwise than by becoming somebody, the exchange waits until it has one.
+    """
+    targets, keys = found.targets, found.targets.keys.tolist()
     at = {row: number for number, row in enumerate(members.tolist())}
     freed = sorted(set(changed) - set(changed.values()))  # identities without a body: they go to who is lost
     sources = {**changed, **dict(zip(sorted(set(changed.values()) - set(changed)), freed, strict=True))}
-    renamed, keys, events = list(found.renamed), dict(found.keys), list(found.events)
-    moments: list[int] = []
-    for body, identity in changed.items():
-        begin = _moment(
-            found.meetings, int(targets.keys[body]), int(targets.keys[identity]), spans.nearest[at[body]]
-        )
-        moments.append(begin)
-        fresh = bool(targets.first[body] >= begin)
-        old, new = int(targets.ids[body]), int(targets.ids[identity])
-        if old > 0 and new > 0:
-            renamed.append(Renamed(old, new, int(targets.first[body]) if fresh else begin, frame.index))
-        elif old == 0:
-            keys[int(targets.keys[body])] = int(targets.keys[identity])
-    begin = min(moments)
+    born = [row for row in freed if row in company.newborn]
+    begin = _moment(found, changed, born, spans, at)
+    over = {row for row in sources if row not in changed and targets.latest[row] < begin}  # needs no identity
+    renamed, renewed = list(found.renamed), dict(found.keys)
+    for row, source in sources.items():
+        old, new = int(targets.ids[row]), int(targets.ids[source])
+        renewed[keys[row]] = keys[source]
+        if row in over or (row in born and old == 0 and new > 0):
+            continue  # nothing was said of it since
+        if not (old > 0 and new > 0):
+            return found
+        renamed.append(Renamed(old, new, begin, frame.index))
     ids = tuple(sorted({int(targets.ids[row]) for row in sources if targets.ids[row] > 0}))
     why = f"by their looks before and after they met: log odds {gain:.1f}"
-    events.append(Event("exchanged", begin, frame.index, ids, why=why))
+    events = (*found.events, Event("exchanged", begin, frame.index, ids, why=why))
     after = _moved(targets, sources, {row: float(spans.begin[at[row]]) for row in sources})
-    return Exchanged(after, found.meetings, keys, tuple(renamed), tuple(events))
+    nobody = [row for row in over if sources[row] in born]
+    ids_after = after.ids.copy()
+    ids_after[nobody] = 0
+    return Exchanged(after.replace(ids=ids_after), found.meetings, renewed, tuple(renamed), events)
 
 
-def _moment(meetings: Meetings, one: int, other: int, otherwise: np.int64) -> int:
-    """The frame in which two were nearest; another, if they met only through others."""
-    both = ((meetings.keys == one) | (meetings.keys == other)).all(axis=1)
-    return int(meetings.nearest[both][-1] if both.any() else otherwise)
+def _moment(
+    found: Exchanged, changed: dict[int, int], born: Sequence[int], spans: _Spans, at: dict[int, int]
+) -> int:
+    """The frame from which identities are exchanged: when one of them was seen first, else when the last two met."""
+    targets, meetings = found.targets, found.meetings
+    if born:
+        return int(targets.first[born].min())
+    moments = []
+    for body, identity in changed.items():
+        one, other = targets.keys[[body, identity]]
+        both = ((meetings.keys == one) | (meetings.keys == other)).all(axis=1)
+        moments.append(int(meetings.nearest[both][-1] if both.any() else spans.nearest[at[body]]))
+    return max(moments)
 
 
 def _moved(targets: Targets, sources: dict[int, int], begin: dict[int, float]) -> Targets:

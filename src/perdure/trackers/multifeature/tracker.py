@@ -271,7 +271,7 @@ class MultiFeature:
         )  # but for newborn ones
         targets, region, where = found.targets.take(found.kept), region[found.kept], where[found.kept]
         smooth = smooth[found.kept]
-        unsaid = rekeyed(rekeyed(state.unsaid, swapped.keys), found.keys)
+        unsaid, gaps = (rekeyed(rekeyed(some, swapped.keys), found.keys) for some in (state.unsaid, gaps))
         moment = Moment(
             frame, regions, region, where, smooth, self.smooth * (1 - state.jitter.gain.mean()), state.size, zones
         )
