@@ -206,7 +206,6 @@ def _given(
     members: Index,
     frame: Frame,
     gain: float,
-
 ) -> Exchanged:
     """The targets, whose bodies have the identities `changed` gives them, body to identity.
 
