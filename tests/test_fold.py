@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perdure.fold import Corrections, settle, settle_by_frame
+from perdure.fold import Corrections, coherent, settle, settle_by_frame
 from perdure.types import Dropped, Event, Renamed, Report, Tracks
 
 
@@ -104,3 +104,17 @@ def test_whatever_is_corrected_one_row_per_frame_and_id_is_left_and_twice_change
     assert pairs(once) == sorted(set(pairs(once)))
     assert settle([Report(once)]).equals(once)
     assert np.all(np.isin(once.ids, (1, 2, 3)))
+
+
+def test_events_do_not_contradict_corrections():
+    """Two turns out to be one: one has entered once, and who has no row any more is not lost."""
+    reports = [
+        Report(said(0, 1), events=(Event("entered", 0, 0, (1,)),)),
+        Report(said(1, 2), events=(Event("entered", 1, 1, (2,)),)),
+        Report(events=(Event("exchanged", 1, 2, (1, 2, 3)), Event("lost", 2, 2, (4,)), Event("alarm", 2, 2))),
+        Report(renamed=(Renamed(2, 1, 0, 9), Renamed(3, 2, 0, 9))),
+    ]
+    corrections = Corrections.of(reports)
+    settled = [corrections.event(one, k) for k, report in enumerate(reports) for one in report.events]
+    told = coherent(settled, set(settle(reports).ids.tolist()))
+    assert [(one.kind, one.ids) for one in told] == [("entered", (1,)), ("exchanged", (1, 2)), ("alarm", ())]

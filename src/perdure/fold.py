@@ -8,7 +8,7 @@ the reports, whose identities may have been decided late, into one row per (fram
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -190,10 +190,10 @@ class Corrections:
 
     def event(self, event: Event, number: int) -> Event:
         """Return an event of report `number` with its settled ids."""
-        ids = (self.identity(one, event.begin, number) for one in event.ids)
-        return (
-            event if not self.by_id else event.__class__(**{**event.__dict__, "ids": tuple(i for i in ids if i)})
-        )
+        if not self.by_id:
+            return event
+        ids = dict.fromkeys(self.identity(one, event.begin, number) for one in event.ids)
+        return replace(event, ids=tuple(one for one in ids if one))
 
     def settled(self, frame: int, said: list[tuple[int, Tracks]]) -> Iterator[tuple[int, Tracks]]:
         """Yield (frame, rows), one per id: of two, the one seen before the one inferred, then the surer, then the later."""
@@ -210,6 +210,25 @@ class Corrections:
         best = np.append(True, np.diff(rows.ids[order]) != 0)[: len(order)]
         if len(rows):
             yield frame, rows.take(order[best])
+
+
+def coherent(events: Iterable[Event], ids: Collection[int]) -> list[Event]:
+    """Return settled events in the order in which they began, without those that corrections have made untrue.
+
+    One whose identity turned out to be another's has not entered a second time, and of an identity without a row,
+    which is not among `ids`, nothing is told.
+    """
+    entered: set[int] = set()
+    told = []
+    for event in sorted(events, key=lambda one: one.begin):
+        if event.ids and not any(one in ids for one in event.ids):
+            continue
+        if event.kind == "entered" and event.ids:
+            if entered.issuperset(event.ids):
+                continue
+            entered.update(event.ids)
+        told.append(event)
+    return told
 
 
 def _punctual(reports: Iterable[Report]) -> Iterator[tuple[int, Tracks]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from perdure.errors import ParameterError
 from perdure.files.log import Entry
-from perdure.fold import Corrections, settle_with
+from perdure.fold import Corrections, coherent, settle_with
 from perdure.types import Event, Explanation, Renamed, Report, Status, Tracks
 
 DECIDING = ("exchanged", "found_again", "mended", "resolved")  # kinds of events that say whose an id is
@@ -144,8 +144,7 @@ def told(read: Callable[[], Iterable[Entry]], identity: int) -> Told:
             parts.append(rows.take(rows.ids == identity))
     if not parts:
         raise ParameterError(_unknown(identity, numbers, corrections))
-    events.sort(key=lambda one: one.begin)
-    return Told(identity, Tracks.join(parts), reasons, tuple(events), any_reasons)
+    return Told(identity, Tracks.join(parts), reasons, tuple(coherent(events, numbers)), any_reasons)
 
 
 def _reason(one: Explanation, frame: int, number: int, corrections: Corrections) -> Reason:

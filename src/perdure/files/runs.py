@@ -16,7 +16,7 @@ from perdure.errors import FormatError, OutputError
 from perdure.files.log import Entry, read_log
 from perdure.files.mot import write_rows
 from perdure.files.whole import cannot_write, whole_file
-from perdure.fold import Corrections, settle, settle_by_frame, settle_with
+from perdure.fold import Corrections, coherent, settle, settle_by_frame, settle_with
 from perdure.params import parameter
 from perdure.types import Event, Report, Tracks
 
@@ -176,26 +176,29 @@ class RunFolder:
         entries = list(read_log(self.log, with_masks=with_masks))
         reports = [entry.report for entry in entries]
         corrections = Corrections.of(reports)
+        rows = settle(reports)
         settled = [
             (event, corrections.event(event, number))
             for number, report in enumerate(reports)
             for event in report.events
         ]
-        events = tuple(after for before, after in settled if after.ids or not before.ids)
-        return settle(reports), events, sum(entry.frame >= 0 for entry in entries)
+        kept = (after for before, after in settled if after.ids or not before.ids)
+        events = tuple(coherent(kept, set(rows.ids.tolist())))
+        return rows, events, sum(entry.frame >= 0 for entry in entries)
 
     def write_results(self, reporting: Reporting) -> Totals:
         """Settle the log into `tracks.txt` and `events.csv`, streaming."""
         corrections = Corrections.of(entry.report for entry in read_log(self.log, with_masks=False))
-        rows, ids = 0, set()
+        rows, ids, known = 0, set(), set()
         with whole_file(self.path / "events.csv") as events, whole_file(self.path / "tracks.txt") as tracks:
             table = _EventTable(events, corrections)
             for _, settled in settle_with(corrections, table.passing(read_log(self.log, with_masks=False))):
+                known.update(settled.ids.tolist())
                 counted = settled.counted(reporting.report_confidence)
                 write_rows(tracks, counted)
                 rows += len(counted)
                 ids.update(counted.ids.tolist())
-            table.write()
+            table.write(known)
         return Totals(rows, len(ids), table.count)
 
 
@@ -216,14 +219,14 @@ class _EventTable:
                 settled = self._corrections.event(event, number)
                 if settled.ids or not event.ids:
                     self._events.append(settled)
-                    self.count += 1
             yield entry.report
 
-    def write(self) -> None:
-        """Write the table; of events that began in one frame, as they were told."""
+    def write(self, ids: set[int]) -> None:
+        """Write the table, where rows have these `ids`; of events that began in one frame, as they were told."""
         self._table.writerow(EVENT_COLUMNS)
-        for event in sorted(self._events, key=lambda one: one.begin):
+        for event in coherent(self._events, ids):
             self._table.writerow(_event_row(event, self._clock))
+            self.count += 1
 
 
 class _Clock:
