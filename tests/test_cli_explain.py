@@ -83,6 +83,24 @@ def test_what_features_count_sums_up_to_the_score_and_the_margin_is_that_to_the_
     assert (value["row"]["regions"], value["row"]["remark"]) == ([0], "")
 
 
+def test_without_an_id_the_most_doubtful_links_of_all_are_shown(run: Path):
+    code, out, _ = said("explain", run, "--json")
+    links = json.loads(out)["links"]
+    assert code == 0
+    assert {one["id"] for one in links} == {1, 2}
+    every = {one: json.loads(said("explain", run, "--id", one, "--all", "--json")[1])["links"] for one in (1, 2)}
+
+    def doubt(link: dict) -> float:
+        return link["score"] if link["margin"] is None else min(link["margin"], link["score"])
+
+    worst = sorted(doubt(link) for some in every.values() for link in some)
+    assert [doubt(one) for one in links] == worst[:10]
+    shown = said("explain", run, "--most", 3)[1].splitlines()
+    assert (len(shown), shown[1].split()[:2]) == (5, ["id", "frame"])
+    for wrong in (("--frame", 3), ("--all",), ("--id", 1, "--all", "--most", 2)):
+        assert said("explain", run, *wrong)[0]
+
+
 def test_without_a_frame_the_most_doubtful_links_come_first_and_all_of_them_in_order(run: Path):
     def links(*words: object) -> list[dict]:
         return json.loads(said("explain", run, "--id", 1, "--json", *words)[1].splitlines()[-1])["links"]
@@ -270,3 +288,23 @@ def test_from_python_contexts_are_files_or_contexts_for_a_film_and_for_a_loop(ya
         perdure.Online("overlap", context="auto")
     with pytest.raises(FormatError):
         perdure.Online("multifeature", context="none.json")
+
+
+def test_weights_that_tell_nothing_of_a_source_are_noted(yard: Path, tmp_path: Path):
+    words = ("--tracker", "multifeature", "--weights", "displacement_2d=1,displacement_3d=1,histogram=1")
+    _, _, noted = said("track", yard, "--no-video", "-o", tmp_path / "run", *words)
+    assert "weigh histogram: nothing without pictures" in noted
+    assert "weigh displacement_3d: nothing without a known ground plane" in noted
+
+
+def test_a_run_of_a_part_and_a_truth_of_another_video_are_noted_by_score(yard: Path, run: Path, tmp_path: Path):
+    part = tracked(yard, tmp_path / "part", "--end", "20f")
+    whole, elsewhere = tmp_path / "whole.txt", tmp_path / "elsewhere.txt"
+    rows = [f"{k + 1},1,{left + 4 * k},61,24,60,1,1,1\n" for left in (21, 1021) for k in range(COUNT)]
+    whole.write_text("".join(rows[:COUNT]))
+    elsewhere.write_text("".join(rows[COUNT:]))
+    assert "is of a part of the video (--end 20f)" in said("score", part, "--truth", whole)[1]
+    assert "is of a part" not in said("score", part, "--truth", whole, "--end", "20f")[1]
+    assert "is of a part" not in said("score", run, "--truth", whole)[1]
+    assert "is it the truth of this video?" in said("score", run, "--truth", elsewhere)[1]
+    assert "is it the truth" not in said("score", run, "--truth", whole)[1]

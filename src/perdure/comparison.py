@@ -140,7 +140,7 @@ def compare_files(match: Match, wanted: Wanted) -> Comparison:
         report_confidence=said.report_confidence,
         beyond=_beyond(main, true),
         group=match.group,
-        notes=(*said.notes, *_notes(main, true)),
+        notes=(*said.notes, *_notes(main, true, pairs), *_of_part(said, window)),
     )
 
 
@@ -221,7 +221,17 @@ def _refuse_other_sizes(said: Result, true: Truth) -> None:
         )
 
 
-def _notes(compared: Compared, true: Truth) -> list[str]:
+def _of_part(said: Result, window: Window) -> list[str]:
+    """That a run of a part of the video is held against the whole truth."""
+    if not said.part or window != Window():
+        return []
+    return [
+        f"{said.path} is of a part of the video ({said.part}), and what is true of the rest counts as missed; "
+        "to score the part alone, name it by --start and --end"
+    ]
+
+
+def _notes(compared: Compared, true: Truth, pairs: Pairs) -> list[str]:
     """What is empty, and why."""
     notes = []
     rows = true.boxes if true.boxes is not None else true.masks
@@ -231,6 +241,8 @@ def _notes(compared: Compared, true: Truth) -> list[str]:
         notes.append(f"no row of {true.path} is asked for in these frames ({why}{hint}): all figures are 0")
     if not len(compared.said):
         notes.append("nothing was said in these frames")
+    elif len(compared.truth) and not len(pairs.said):
+        notes.append(f"no row lies on one of {true.path}: is it the truth of this video?")
     return notes
 
 

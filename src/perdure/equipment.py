@@ -83,12 +83,15 @@ def check_looks(tracker: object, source: str) -> None:
 def notes(tracker: object, given: Sequence[str], *, pictures: bool, ground: bool) -> tuple[str, ...]:
     """Return what the user should know of the contexts that he named and of a network, with a source as it is."""
     found = []
-    for one in getattr(tracker, "contexts", ()) if set(given) - {AUTO, OWN} else ():
-        looks = [] if pictures else [feature for feature in one.used if needs_pixels(feature)]
-        metres = [] if ground else [feature for feature in one.used if feature == ON_GROUND]
-        for features, what in ((looks, "pictures, which the source has not"), (metres, "a known ground plane")):
-            if features:
-                found.append(f"the context {one.name} weighs {', '.join(features)}: nothing without {what}")
+    weights = getattr(tracker, "weights", "")
+    contexts = getattr(tracker, "contexts", ()) if set(given) - {AUTO, OWN} else ()
+    for who, used in _weighing(contexts, weights).items():
+        features = [feature for feature, weight in used.items() if weight > 0]
+        looks = [] if pictures else [feature for feature in features if needs_pixels(feature)]
+        metres = [] if ground else [feature for feature in features if feature == ON_GROUND]
+        for without, what in ((looks, "pictures, which the source has not"), (metres, "a known ground plane")):
+            if without:
+                found.append(f"{who} {', '.join(without)}: nothing without {what}")
     if getattr(tracker, "network", None) is not None and not pictures:
         found.append("the source has no images; the embedding tells nothing")
     return tuple(found)

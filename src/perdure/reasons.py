@@ -5,6 +5,7 @@ Ids are the settled ones, as results have them, whatever they were called when a
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -145,6 +146,20 @@ def told(read: Callable[[], Iterable[Entry]], identity: int) -> Told:
     if not parts:
         raise ParameterError(_unknown(identity, numbers, corrections))
     return Told(identity, Tracks.join(parts), reasons, tuple(coherent(events, numbers)), any_reasons)
+
+
+def most_doubtful(read: Callable[[], Iterable[Entry]], most: int) -> list[tuple[int, Reason]]:
+    """Return the settled ids and reasons of the most doubtful links of a run, the worst first; `read` is called twice."""
+    corrections = Corrections.of(entry.report for entry in read())
+
+    def every() -> Iterator[tuple[int, Reason]]:
+        for number, entry in enumerate(read()):
+            for one in entry.report.explanations:
+                identity = corrections.identity(one.id, entry.frame, number)
+                if identity:
+                    yield identity, _reason(one, entry.frame, number, corrections)
+
+    return heapq.nsmallest(most, every(), key=lambda one: (one[1].doubt, one[0]))
 
 
 def _reason(one: Explanation, frame: int, number: int, corrections: Corrections) -> Reason:

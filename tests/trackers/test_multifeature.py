@@ -257,7 +257,7 @@ def test_the_global_similarity_weighs_the_long_term_one_by_beta_and_leaves_out_w
 
 @pytest.mark.parametrize(
     ("weights", "wrong"),
-    [("area=0,overlap=0", "all are 0"), ("aera=1", "did you mean 'area'"), ("area=-1", "≥ 0"), ("area=x", "≥ 0"), ("area", "≥ 0")],
+    [("area=0,overlap=0", "all are 0"), ("aera=1", "did you mean 'area'"), ("area=-1", "≥ 0"), ("area=x", "≥ 0"), ("area=1,area=2", "twice"), ("area", "≥ 0")],
 )  # fmt: skip
 def test_weights_that_cannot_be_are_refused(weights: str, wrong: str):
     with pytest.raises(ParameterError, match=wrong):

@@ -16,8 +16,11 @@ from perdure.cli.tables import aligned
 from perdure.errors import ParameterError
 from perdure.files.log import read_log
 from perdure.files.runs import RunFolder
-from perdure.reasons import Reason, Told, told
+from perdure.reasons import Reason, Told, most_doubtful, told
 from perdure.types import Event, Status
+
+LINK_COLUMNS = ["frame", "score", "margin", "runner-up", "other region", "least alike"]
+MOST = 10  # links that are shown where nobody says how many
 
 
 def explain(
@@ -25,10 +28,16 @@ def explain(
         Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
     ],
     identity: Annotated[
-        int, typer.Option("--id", metavar="ID", help="Whose rows: an id of the results.", show_default=False)
-    ],
-    frame: Annotated[
         Optional[int],  # noqa: UP045 - typer reads this at run time
+        typer.Option(
+            "--id",
+            metavar="ID",
+            help="Whose rows: an id of the results; without it the most doubtful links of the run.",
+            show_default=False,
+        ),
+    ] = None,
+    frame: Annotated[
+        Optional[int],  # noqa: UP045
         typer.Option(
             "--frame",
             metavar="N",
@@ -37,22 +46,34 @@ def explain(
         ),
     ] = None,
     most: Annotated[
-        int, typer.Option("--most", metavar="N", min=0, help="How many links are shown without --frame.")
-    ] = 10,
+        Optional[int],  # noqa: UP045
+        typer.Option(
+            "--most", metavar="N", min=1, help="How many are shown without --frame; 10.", show_default=False
+        ),
+    ] = None,
     all_: Annotated[bool, typer.Option("--all", help="Show every link, in the order of frames.")] = False,
     json_: options.JsonOption = False,
 ) -> None:
     """Show why a target has its id: by frame the features' similarities, weights, the score, and who came next."""
     if frame is not None and all_:
         raise ParameterError("--all shows every frame and --frame one; leave out one of them")
+    if most is not None and (all_ or frame is not None):
+        raise ParameterError(
+            f"--most shows some and {'--all all' if all_ else '--frame one'}; leave out one of them"
+        )
     folder = RunFolder.open(run)
+    if identity is None:
+        if frame is not None or all_:
+            raise ParameterError(f"{'--frame' if all_ is False else '--all'} goes with an id; name it by --id")
+        _overview(folder, most or MOST, as_json=json_)
+        return
     found = told(lambda: read_log(folder.log, with_masks=False), identity)
     note = _note(found, folder.read_about())
     if note:
         print(f"perdure: note: {note}", file=sys.stderr)
     if frame is not None:
         found.row(frame)
-    chosen = list(found.reasons.values()) if all_ else found.doubtful(most)
+    chosen = list(found.reasons.values()) if all_ else found.doubtful(most or MOST)
     if frame is not None:
         chosen = [found.reasons[frame]] if frame in found.reasons else []
     events = found.events if frame is None else found.about(frame)
@@ -63,10 +84,26 @@ def explain(
     print("\n".join([*lines, *_words_of_events(events)]))
 
 
+def _overview(folder: RunFolder, most: int, *, as_json: bool) -> None:
+    """Print the most doubtful links of a run."""
+    links = most_doubtful(lambda: read_log(folder.log, with_masks=False), most)
+    note = "" if links else _without_reasons(folder.read_about())
+    if as_json:
+        value = {"run": str(folder.path), "note": note, "links": [{"id": one, **_link(why)} for one, why in links]}
+        print(json.dumps(value))
+        return
+    if not links:
+        raise ParameterError(note)
+    table = [["id", *LINK_COLUMNS], *([str(one), *_cells(why)] for one, why in links)]
+    print(f"the most doubtful links of all (more of one by --id):\n{aligned(table)}")
+
+
 def _note(found: Told, about: dict[str, Any]) -> str:
     """What the user must know of a run that explains nothing."""
-    if found.any_reasons:
-        return ""
+    return "" if found.any_reasons else _without_reasons(about)
+
+
+def _without_reasons(about: dict[str, Any]) -> str:
     tracker = about.get("tracker") if isinstance(about.get("tracker"), dict) else {}
     name, parameters = (tracker or {}).get("name", ""), (tracker or {}).get("parameters", {})
     if "explain" in parameters:
@@ -115,21 +152,22 @@ def _summary(found: Told, chosen: Sequence[Reason], *, sparse: bool) -> list[str
     ]
     if not chosen:
         return lines
-    table = [["frame", "score", "margin", "runner-up", "other region", "least alike"]]
-    for one in chosen:
-        least = min(one.shares, key=lambda part: part.whole, default=None)
-        table.append(
-            [
-                str(one.frame),
-                f"{one.score:.2f}",
-                "-" if one.margin is None else f"{one.margin:.2f}",
-                "-" if one.runner_up is None else f"id {one.runner_up[0]}: {one.runner_up[1]:.2f}",
-                "-" if one.other_region is None else f"{one.other_region[0]}: {one.other_region[1]:.2f}",
-                "-" if least is None else f"{least.feature} {least.whole:.2f}",
-            ]
-        )
+    table = [LINK_COLUMNS, *(_cells(one) for one in chosen)]
     order = ", the most doubtful first" if sparse and len(chosen) > 1 else ""
     return [*lines, "", f"links{order}:", aligned(table)]
+
+
+def _cells(one: Reason) -> list[str]:
+    """A link, in `LINK_COLUMNS`."""
+    least = min(one.shares, key=lambda part: part.whole, default=None)
+    return [
+        str(one.frame),
+        f"{one.score:.2f}",
+        "-" if one.margin is None else f"{one.margin:.2f}",
+        "-" if one.runner_up is None else f"id {one.runner_up[0]}: {one.runner_up[1]:.2f}",
+        "-" if one.other_region is None else f"{one.other_region[0]}: {one.other_region[1]:.2f}",
+        "-" if least is None else f"{least.feature} {least.whole:.2f}",
+    ]
 
 
 def _words_of_events(events: Sequence[Event]) -> list[str]:

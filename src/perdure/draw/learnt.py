@@ -13,7 +13,7 @@ from perdure.features.pool import POOL
 from perdure.learn import Learnt, link_similarity
 from perdure.types import Image
 
-WIDTH, PANEL = 620, 300  # px
+WIDTH, PANEL, _KEY = 620, 300, 40  # px
 _LEFT, _RIGHT, _TOP, _BOTTOM = 30, 20, 62, 34  # px round a panel's axis
 _BINS = 50
 _SAME, _DIFFERENT, _CHOSEN = COLOURS[0], COLOURS[1], COLOURS[2]
@@ -43,7 +43,20 @@ def plot(learnt: Learnt) -> Image:
     panels.append(_panel(_LINK, words, kinds, [(context.similar, 1.0)], ()))
     if len(panels) % 2:
         panels.append(np.full_like(panels[0], PAPER))
-    return np.vstack([np.hstack(panels[k : k + 2]) for k in range(0, len(panels), 2)])
+    return np.vstack([*(np.hstack(panels[k : k + 2]) for k in range(0, len(panels), 2)), _key()])
+
+
+def _key() -> Image:
+    """What the axes and marks mean."""
+    picture = np.full((_KEY, 2 * WIDTH, 3), PAPER, np.uint8)
+    write(picture, "across: similarity; up: share of pairs (its root)", (_LEFT, 24))
+    x = WIDTH + _LEFT
+    cv2.line(picture, (x + 4, 8), (x + 4, 28), _CHOSEN, 2)
+    write(picture, "threshold of a round, or Th1", (x + 16, 24))
+    x += 44 + width_of("threshold of a round, or Th1")
+    cv2.fillPoly(picture, [np.array([(x, 13), (x - 6, 23), (x + 6, 23)], np.int32)], INK)
+    write(picture, "level", (x + 16, 24))
+    return picture
 
 
 def _panel(

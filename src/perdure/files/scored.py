@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from perdure import params
 from perdure.errors import FormatError, ParameterError
@@ -36,6 +37,8 @@ class Result:
         Of a run: from which confidence hidden targets count.
     notes : tuple of str
         What the reader must know: that a run is not complete.
+    part : str
+        The options by which a run was kept to a part of its video; empty for the whole.
     """
 
     path: Path
@@ -45,6 +48,7 @@ class Result:
     events: tuple[Event, ...] | None = None
     report_confidence: float | None = None
     notes: tuple[str, ...] = ()
+    part: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +216,14 @@ def _read_run(folder: RunFolder, masks: bool, report_confidence: float | None) -
         notes.append(f"{folder.path} is {about['status']}: it ends after {frames} frames")
     elif isinstance(about.get("frames"), int) and frames < about["frames"]:
         notes.append(f"the log of {folder.path} breaks off after {frames} of {about['frames']} frames")
-    return Result(folder.path, counted, counted if masks else None, tracks, events, least, tuple(notes))
+    seen = counted if masks else None
+    return Result(folder.path, counted, seen, tracks, events, least, tuple(notes), _part(about))
+
+
+def _part(about: Mapping[str, Any]) -> str:
+    window = about.get("window")
+    limits = window if isinstance(window, dict) else {}
+    return " ".join(f"--{name} {limits[name]}" for name in ("start", "end") if limits.get(name) is not None)
 
 
 def _size(about: Mapping[str, object]) -> tuple[int, int] | None:

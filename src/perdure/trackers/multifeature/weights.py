@@ -29,7 +29,7 @@ def weights_of(text: str) -> dict[str, float]:
     Raises
     ------
     ParameterError
-        For an unknown feature, a weight that is no number ≥ 0, or weights that are all 0.
+        For an unknown feature, one named twice, a weight that is no number ≥ 0, or weights that are all 0.
 
     >>> weights_of("area=0.5, shape_ratio=1")
     {'area': 0.5, 'shape_ratio': 1.0}
@@ -39,6 +39,8 @@ def weights_of(text: str) -> dict[str, float]:
         name, _, number = (one.strip() for one in part.partition("="))
         if name not in (*POOL, EMBEDDING):
             raise ParameterError(f"weights = {text!r}: {unknown_name('feature', name, [*POOL, EMBEDDING])}")
+        if name in found:
+            raise ParameterError(f"weights = {text!r}: {name} is named twice; leave out one")
         try:
             found[name] = float(number)
         except ValueError:
