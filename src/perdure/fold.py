@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from perdure.interpret import Interpreter
 from perdure.types import Dropped, Event, Frame, Regions, Renamed, Report, Scene, Tracks
 
 S = TypeVar("S")
@@ -42,6 +43,9 @@ class Detector(Protocol[S]):
 class Tracker(Protocol[S]):
     """Regions to reports: a frozen dataclass of parameters; it prints, compares, is its own configuration.
 
+    One may have `heed(state, advice) -> state`: it is told, between two steps, for how many times as long interpretation
+    wants targets kept that are not seen (`perdure.scene.advice`).
+
     `step` changes neither `frame` nor `regions` and depends on nothing else. The state passed in is
     consumed: its buffers may be reused; `perdure.states.save` gives an independent copy.
     A tracker that goes on from what the user marked (`regions.data["mark"]`), with no detector after that frame, has
@@ -69,6 +73,7 @@ class Step(NamedTuple):
     frame: Frame | None
     regions: Regions
     report: Report
+    begun: tuple[Event, ...] = ()  # scenarios that have been recognised and are still going on
 
 
 def detect(frames: Iterable[Frame], detector: Detector[Any], scene: Scene) -> Iterator[tuple[Frame, Regions]]:
@@ -94,22 +99,32 @@ def run(
     tracker: Tracker[Any],
     scene: Scene,
     wanted: Callable[[Regions], Regions] | None = None,
+    interpreter: Interpreter | None = None,
 ) -> Iterator[Step]:
     """Yield a step for every frame, and one more in which the tracker finishes; the detector heeds the tracker.
 
-    `wanted` leaves the regions that the tracker shall see.
+    `wanted` leaves the regions that the tracker shall see; an `interpreter` adds to what the tracker says and takes back
+    from it, the tracker heeds its advice, and the detector heeds what is left.
     """
     state, beliefs = detector.start(scene), tracker.start(scene)
-    heed = getattr(detector, "heed", None)
+    views = None if interpreter is None else interpreter.start()
+    heed, advised = getattr(detector, "heed", None), getattr(tracker, "heed", None)
+    begun: tuple[Event, ...] = ()
     for frame in frames:
         state, regions = detector.step(state, frame)
         if wanted is not None:
             regions = wanted(regions)
         beliefs, report = tracker.step(beliefs, frame, regions)
+        if interpreter is not None and views is not None:
+            views, (report, begun, advice) = interpreter.step(views, frame.index, frame.time, report)
+            beliefs = beliefs if advised is None else advised(beliefs, advice)
         if heed is not None:
             state = heed(state, report)
-        yield Step(frame, regions, _with_events(regions, report))
-    yield Step(None, Regions.empty(), tracker.finish(beliefs))
+        yield Step(frame, regions, _with_events(regions, report), begun)
+    last = tracker.finish(beliefs)
+    if interpreter is not None and views is not None:
+        last = interpreter.finish(views, last)
+    yield Step(None, Regions.empty(), last)
 
 
 def _with_events(regions: Regions, report: Report) -> Report:

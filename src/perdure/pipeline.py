@@ -23,12 +23,15 @@ from perdure.files.calibration import read_calibration
 from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
+from perdure.files.scenarios import read_rules
 from perdure.files.shapes import filled, is_file
 from perdure.files.video import Source, open_source
 from perdure.files.zones import read_zones
+from perdure.interpret import Feedback, Interpreter
 from perdure.scene.ground import Ground
 from perdure.scene.perspective import BODY, Estimate, estimate
 from perdure.scene.placing import Paths, placed
+from perdure.scene.scenarios import Rules
 from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
@@ -58,6 +61,8 @@ class Plan:
     body: float = 0.0  # m that people are high; above 0 where the ground is to be estimated from them
     estimate: Estimate | None = None  # what they told of it
     contexts: tuple[str, ...] = ()  # that the user named, in words
+    rules: Rules | None = None  # scenarios that are to be recognised
+    feedback: Feedback = dataclasses.field(default_factory=Feedback)  # and what they do to tracks
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -169,6 +174,9 @@ class Plan:
     def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
         """Yield every step of the run, the finishing one last."""
         given = self.source if frames is None else frames
+        if self.rules is not None:  # which puts rows on the ground itself
+            interpreter = Interpreter.of(self.scene, self.rules, self.feedback)
+            return fold.run(given, self._whole(), self.tracker, self.scene, self._wanted, interpreter)
         steps = fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
         return steps if self.scene.ground is None else _placed(steps, self.scene.ground)
 
@@ -201,6 +209,7 @@ def plan(
     classes: str | Collection[str] | None = (),
     context: AnyContext | Sequence[AnyContext] | None = None,
     embedding: str | Path | None = None,
+    scenarios: str | Path | Rules | None = None,
     parameters: Mapping[str, object] | None = None,
 ) -> Plan:
     """Open a source and make the detector and tracker for it.
@@ -240,8 +249,11 @@ def plan(
         video is in force; 'auto', those that come with Perdure; 'default', its own weights.
     embedding : str, Path or None
         For the multi-feature tracker, an ONNX file of a network by which looks are told apart, too.
+    scenarios : str, Path, Rules or None
+        Scenarios that are to be recognised: a file of them, or 'usual' for those that come with Perdure. Targets that are
+        taken for noise are then taken back, and who does something of interest is kept for longer.
     parameters : mapping
-        Values of the detector's and tracker's parameters by name.
+        Values of the detector's and tracker's parameters by name, and of `perdure.interpret.Feedback` with scenarios.
 
     Raises
     ------
@@ -257,7 +269,9 @@ def plan(
     try:
         if detector is None and not words and not opened.has_images:
             detector, name = _own_detections(opened), "recorded"
-        of_tracker, of_detector = split(parameters or {}, tracker, name)
+        rules = scenarios if isinstance(scenarios, Rules) or scenarios is None else read_rules(scenarios)
+        of_feedback, others = _of_feedback(parameters or {}, rules)
+        of_tracker, of_detector = split(others, tracker, name)
         made_tracker = params.build(TRACKERS[tracker], of_tracker)
         made_tracker = equipped(made_tracker, tracker, context, embedding)
         made_detector = params.build(DETECTORS[name], of_detector)
@@ -270,6 +284,8 @@ def plan(
             scene = dataclasses.replace(scene, ground=ground)
         if zones is not None:
             scene = zoned(scene, zones)
+        if rules is not None:
+            rules.check_zones(tuple(one.name for one in scene.zones))
         marks: tuple[Mark, ...] = ()
         if init is not None and words:
             _refuse_late_start(opened, start)
@@ -291,6 +307,8 @@ def plan(
             marks,
             body,
             contexts=equipment.words_of(context),
+            rules=rules,
+            feedback=params.build(Feedback, of_feedback),
         )
         made.check()
     except BaseException:
@@ -341,7 +359,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
         Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, zones, calibration, object_height,
-        classes, context, embedding; and parameters of the detector and the tracker by name.
+        classes, context, embedding, scenarios; and parameters of the detector and the tracker by name.
 
     Raises
     ------
@@ -455,6 +473,19 @@ def split(given: Mapping[str, object], tracker: str, detector: str) -> Split:
     return divided
 
 
+def _of_feedback(
+    given: Mapping[str, object], rules: Rules | None
+) -> tuple[dict[str, object], Mapping[str, object]]:
+    """Values of `Feedback` among those that were given, and the others."""
+    if not isinstance(given, Mapping):
+        return {}, given
+    known = {one.name for one in params.describe(Feedback)}
+    own = {name: value for name, value in given.items() if name in known}
+    if own and rules is None:
+        raise ParameterError(f"{next(iter(own))!r} goes with --scenarios; name a file of them, or 'usual'")
+    return own, {name: value for name, value in given.items() if name not in known}
+
+
 def _stranger(name: str, owners: Mapping[str, str], tracker: str, detector: str) -> str:
     for what, kinds in (("tracker", TRACKERS), ("detector", DETECTORS)):
         for other, kind in kinds.items():
@@ -486,6 +517,7 @@ _OPTIONS = frozenset(
         "classes",
         "context",
         "embedding",
+        "scenarios",
         "parameters",
     )
 )

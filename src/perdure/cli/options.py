@@ -81,6 +81,16 @@ ZonesOption = Annotated[
         show_default=False,
     ),
 ]
+ScenariosOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--scenarios",
+        metavar="FILE|usual",
+        help="What is to be recognised, a TOML file of scenarios, or 'usual' for those that come with Perdure: told "
+        "as events. Targets taken for noise are then taken back, who does something of interest is kept for longer.",
+        show_default=False,
+    ),
+]
 ContextOption = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(

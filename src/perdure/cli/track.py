@@ -21,18 +21,25 @@ from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
 from perdure.equipment import chosen_by
-from perdure.errors import OutputError
+from perdure.errors import OutputError, ParameterError
 from perdure.files.calibration import value_of
+from perdure.files.live_events import LiveEvents
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
+from perdure.files.scenarios import rules_to_json
 from perdure.files.shapes import is_file
 from perdure.files.zones import zones_to_json
 from perdure.fold import Step
+from perdure.interpret import Feedback
 from perdure.pipeline import Plan, plan
 from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
 
-_FAMILIES = (("tracker", TRACKERS), ("detector", DETECTORS), ("", {"What counts": Reporting}))
+_FAMILIES = (
+    ("tracker", TRACKERS),
+    ("detector", DETECTORS),
+    ("", {"What counts": Reporting, "Scenarios": Feedback}),
+)
 
 
 @options.with_parameters(*_FAMILIES)
@@ -60,6 +67,16 @@ def track(
     object_height: options.ObjectHeightOption = None,
     zones: options.ZonesOption = None,
     class_: options.ClassOption = None,
+    scenarios: options.ScenariosOption = None,
+    events: Annotated[
+        str | None,
+        typer.Option(
+            "--events",
+            metavar="-",
+            help="'-' writes events to stdout as they happen, a JSON object a line; all else is then on stderr.",
+            show_default=False,
+        ),
+    ] = None,
     context: options.ContextOption = None,
     embedding: options.EmbeddingOption = None,
     fps: options.FpsOption = None,
@@ -72,6 +89,10 @@ def track(
     json_: options.JsonOption = False,
 ) -> None:
     """Track every moving thing in SOURCE into a run folder."""
+    if events not in (None, "-"):
+        raise ParameterError(f"--events {events}: only '-', for stdout, is known; the run folder has events.csv")
+    if events and json_:
+        raise ParameterError("--events - and --json both write to stdout; leave out one of them")
     given = options.read_parameters(parameters, chosen)
     reporting = params.build(
         Reporting, {name: given.pop(name) for name in list(given) if name == "report_confidence"}
@@ -92,12 +113,13 @@ def track(
         classes=class_ or (),
         context=context or None,
         embedding=embedding,
+        scenarios=scenarios,
         parameters=given,
     )
     place = output or Path("perdure-runs") / made.source.name
     inputs = [
         Path(one)
-        for one in (source, detector, roi, zones, calibration, parameters, embedding, *(context or ()))
+        for one in (source, detector, roi, zones, calibration, parameters, embedding, scenarios, *(context or ()))
         if one is not None and is_file(one)
     ]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
@@ -106,8 +128,10 @@ def track(
         window["zones"] = str(zones)
     if calibration is not None:
         window |= {"calibration": calibration, "object_height": object_height}
-    outcome = run(made, folder, reporting, window=window, film=not no_video)
-    show(outcome, folder, as_json=json_)
+    live = LiveEvents(sys.stdout) if events else None
+    outcome = run(made, folder, reporting, window=window, film=not no_video, live=live)
+    with contextlib.redirect_stdout(sys.stderr) if events else contextlib.nullcontext():
+        show(outcome, folder, as_json=json_)
     if outcome.code:
         raise typer.Exit(outcome.code)
 
@@ -137,7 +161,13 @@ class Outcome:
 
 
 def run(
-    made: Plan, folder: RunFolder, reporting: Reporting, *, window: dict[str, Any] | None = None, film: bool = True
+    made: Plan,
+    folder: RunFolder,
+    reporting: Reporting,
+    *,
+    window: dict[str, Any] | None = None,
+    film: bool = True,
+    live: LiveEvents | None = None,
 ) -> Outcome:
     """Run a plan into a folder: log, results, film; whatever happens, what was tracked so far is kept."""
     about = _about(made, reporting, window or {})
@@ -145,7 +175,7 @@ def run(
     counted = _Count()
     try:
         with Ending() as ending:
-            return _run(made, folder, reporting, about, film, ending, counted)
+            return _run(made, folder, reporting, about, film, ending, counted, live)
     except BaseException:
         if counted.frames:
             with contextlib.suppress(OutputError):
@@ -165,6 +195,7 @@ def _run(
     film: bool,
     ending: Ending,
     counted: _Count,
+    live: LiveEvents | None,
 ) -> Outcome:
     begun = time.monotonic()
     live_film = film and not made.source.rereadable
@@ -178,6 +209,8 @@ def _run(
             steps = drawn_while_running(steps, made.scene, folder.film)
         for step in steps:
             context = next(filter(None, (chosen_by(made.tracker, one) for one in step.report.events)), context)
+            if live is not None:
+                live.tell(step)
             log.append(-1 if step.frame is None else step.frame.index, counted.time(step.frame), step.report)
     totals = folder.write_results(reporting)
     tracked = time.monotonic()
@@ -263,9 +296,17 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         **equipment.about(made.tracker, made.contexts),
         **({"embedding": made.tracker.network.name} if getattr(made.tracker, "network", None) else {}),
         "reporting": params.values(reporting),
+        **_interpretation(made),
         **_ground(made),
         **({"zones": zones_to_json(Zones.of(made.scene))} if made.scene.zones else {}),
     }
+
+
+def _interpretation(made: Plan) -> dict[str, Any]:
+    """Which scenarios are looked for, and what they do to tracks; nothing where none are."""
+    if made.rules is None:
+        return {}
+    return {"scenarios": {**rules_to_json(made.rules), "feedback": params.values(made.feedback)}}
 
 
 def _ground(made: Plan) -> dict[str, Any]:

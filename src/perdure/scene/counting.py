@@ -347,7 +347,7 @@ def _places(tracks: Tracks, point: str, size: tuple[int, int] | None) -> Float:
     return np.column_stack([middle[:, 0], boxes[:, 3] if point == "foot" else middle[:, 1]])
 
 
-def _meetings(begin: Float, end: Float, edges: Float) -> list[tuple[float, int]]:
+def steps_over(begin: Float, end: Float, edges: Float) -> list[tuple[float, int]]:
     """Where a step from one point to another meets edges (E, 4): its share in [0, 1], and +1 to their right, else -1.
 
     Where a point is exactly on an edge, or a corner exactly on the step, all points of paths are thought to lie a trifle
@@ -383,7 +383,7 @@ def _crossings(path: _Path, line: Line, away: float) -> Iterator[Crossing]:
     far = shapely.distance(shapely.LineString(points), shapely.points(path.points)) >= away  # (N,)
     pending: list[tuple[float, float, int]] = []  # frame, time, +1 or -1
     for i in range(1, len(path.points)):
-        for share, sign in _meetings(path.points[i - 1], path.points[i], edges):
+        for share, sign in steps_over(path.points[i - 1], path.points[i], edges):
             frame, time = (_between(column, i, share) for column in (path.frames, path.times))
             pending.append((frame, time, sign))
         if far[i]:
@@ -453,7 +453,7 @@ def _pieces(path: _Path, shape: Any, edges: Float) -> tuple[Float, Float, NDArra
 
     cuts = [path.times[0]]
     for i in range(1, len(path.times)):
-        shares = [share for share, _ in _meetings(path.points[i - 1], path.points[i], edges)]
+        shares = [share for share, _ in steps_over(path.points[i - 1], path.points[i], edges)]
         cuts += [_between(path.times, i, share) for share in shares if 0 < share < 1]
         cuts.append(path.times[i])
     knots = np.array(cuts)

@@ -7,7 +7,7 @@ seen is kept for `patience` seconds, which do not pass while the detector is bli
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +17,7 @@ from perdure.features.boxes import centres, overlaps
 from perdure.features.masks import disjoint, holding
 from perdure.maths.assign import assign
 from perdure.params import parameter
+from perdure.scene.advice import Advice
 from perdure.scene.ground import Ground
 from perdure.scene.reach import within_reach
 from perdure.scene.zones import FORBIDDEN, Zones, counting, renumbered
@@ -45,6 +46,7 @@ class OverlapState:
     evidence: NDArray[np.float64]  # (N,) s for which each must be seen where it came in
     entry: Index  # (N,) the entry by which it came in; -1 for none
     behind: Index  # (N,) the occluder behind which it is; -1 for none
+    advice: Advice = field(default_factory=Advice.none)  # how long who is kept, of interpretation
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,10 @@ class Overlap:
         state, rows, events = self._say(state, frame, regions, link)
         state, left = self._retire(state, frame, link, regions.blind)
         return state, Report(rows, events=(*events, *again, *hidden, *left))
+
+    def heed(self, state: OverlapState, advice: Advice) -> OverlapState:
+        """Return the state, in which targets are kept for as many times as long as interpretation advises (IV.D)."""
+        return replace(state, advice=advice)
 
     def finish(self, state: OverlapState) -> Report:
         """Return what is left to say: nothing."""
@@ -205,7 +211,7 @@ class Overlap:
     ) -> tuple[OverlapState, list[Event]]:
         """Let go of targets not seen for `patience` seconds, and of unconfirmed ones at the first miss."""
         usual, inside = np.full(len(link), self.patience), np.zeros(len(link), np.bool_)
-        patience = state.zones.kept(state.boxes, state.behind, usual, inside)
+        patience = state.zones.kept(state.boxes, state.behind, usual, inside) * state.advice.of(state.ids)
         awaited = (state.evidence > self.confirm) & (frame.time - state.born >= self.confirm)
         awaited &= state.missed <= self.confirm + 1e-9  # would have a name, had it come in elsewhere
         kept = np.where(state.ids > 0, state.missed <= patience + 1e-9, (link >= 0) | blind | awaited)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +12,7 @@ from perdure.features.appearance import look, signature
 from perdure.maths.jitter import Jitter
 from perdure.maths.jitter import learnt as surprised
 from perdure.params import parameter
+from perdure.scene.advice import Advice
 from perdure.scene.ground import Ground
 from perdure.scene.reach import within_reach
 from perdure.scene.zones import Zones, counting, renumbered
@@ -53,6 +54,7 @@ class CompoundState:
     size: tuple[int, int]  # height, width of the picture
     ground: Ground | None  # where it lies, if it is known and wanted
     zones: Zones
+    advice: Advice = field(default_factory=Advice.none)  # how long who is kept, of interpretation
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,7 @@ class Compound:
             newly = np.flatnonzero((said.targets.ids >= state.next_id) & ~said.targets.temporary)
             mended = mend(early, said.targets, newly, bodies, state.size)
         told = happenings(state.targets, mended.targets, moment)
-        kept, gone = self._retired(mended.targets, region, frame, state.size, regions.blind, zones)
+        kept, gone = self._retired(mended.targets, region, frame, state, regions.blind)
         live = set(kept.compound.tolist())
         compounds = tuple(one for one in meeting.compounds if one.key in live)
         key = meeting.next_key + len(births)
@@ -221,6 +223,10 @@ class Compound:
         again = (*back.events, *found.events)
         events = (*said.events, *mended.events, *company.events, *meeting.events, *again, *told, *gone)
         return state, Report(rows, (*meeting.renamed, *back.renamed, *found.renamed), mended.dropped, events)
+
+    def heed(self, state: CompoundState, advice: Advice) -> CompoundState:
+        """Return the state, in which targets are kept for as many times as long as interpretation advises (IV.D)."""
+        return replace(state, advice=advice)
 
     def finish(self, state: CompoundState) -> Report:
         """Return what is left to say: who had left when the film ended."""
@@ -313,15 +319,15 @@ class Compound:
         targets: Targets,
         region: NDArray[np.intp],
         frame: Frame,
-        size: tuple[int, int],
+        state: CompoundState,
         blind: bool,
-        zones: Zones,
     ) -> tuple[Targets, list[Event]]:
         """Let go of who was not seen for long (IV.D), and of unnamed ones at the first miss."""
-        soonest = 0.0 if zones else min(self.patience, self.longest)
+        size, zones = state.size, state.zones
+        soonest = 0.0 if zones or len(state.advice.ids) else min(self.patience, self.longest)
         doubtful = (targets.missed > soonest) | (targets.ids == 0)
         events: list[Event] = []
-        if doubtful.any() and not (kept := self._kept(targets, region, frame, size, blind, zones)).all():
+        if doubtful.any() and not (kept := self._kept(targets, region, frame, state, blind)).all():
             gone = np.flatnonzero(~kept & (targets.ids > 0) & ~targets.temporary)
             events, targets = _gone(targets, gone, frame.index, size, zones), targets.take(kept)
         if not targets.compound.any():
@@ -334,11 +340,11 @@ class Compound:
         targets: Targets,
         region: NDArray[np.intp],
         frame: Frame,
-        size: tuple[int, int],
+        state: CompoundState,
         blind: bool,
-        zones: Zones,
     ) -> NDArray[np.bool_]:
         """Which targets (N,) are not let go of."""
+        size, zones = state.size, state.zones
         remembered = self.recall if frame.image is not None and self.colour else self.patience
         limit = np.where(targets.frozen, self.longest, max(remembered, self.patience)) + 1e-9
         if (targets.missed > self.patience).any():  # who was going out over the border will not be found again
@@ -353,6 +359,8 @@ class Compound:
             limit[away] = zones.kept(boxes, targets.behind[away], limit[away], out) + 1e-9
             lasted = frame.time - targets.born >= self.confirm  # would have a name, came it in elsewhere
             seen |= lasted & (targets.evidence > self.confirm) & (targets.missed <= self.confirm + 1e-9)
+        if len(state.advice.ids):
+            limit *= state.advice.of(targets.ids)
         kept = np.where(unnamed, seen, targets.missed <= limit)
         if blind:
             kept |= unnamed | targets.temporary

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from perdure.maths import lie
 from perdure.params import Schedule, parameter
+from perdure.scene.advice import Advice
 from perdure.scene.whereabouts import Waiting
 from perdure.scene.zones import Zones, counting, renumbered
 from perdure.trackers.contour import observer
@@ -42,6 +43,7 @@ class ContourState:
     time: float
     size: tuple[int, int]  # height, width
     zones: Zones
+    advice: Advice = field(default_factory=Advice.none)  # how long who is kept, of interpretation
 
 
 @dataclass(frozen=True)
@@ -139,28 +141,34 @@ class Contour:
         targets = born.targets
         covered = np.any([nothing, *(one.seen.to_image(*state.size) for one in targets)], axis=0)
         place = learnt_place(place, lab, boxed(targets, state.size, by.group), covered, _PLACE_RATE)
-        kept, believed, lost = self._kept(targets, frame, state.size, zones)
+        kept, believed, lost = self._kept(targets, frame, state)
         rows = rows_of(kept, believed, frame, state.size, self.patience, by.group)
         events = (*born.events, *lost, *happenings(was, kept, frame, zones))
         keys = state.next_key + len(born.new), max([state.next_id, *(one.id + 1 for one in born.new)])
         after = ContourState(tuple(kept), born.waiting, place, light, *keys, frame.time, state.size, zones)
         return after, Report(rows, events=events)
 
+    def heed(self, state: ContourState, advice: Advice) -> ContourState:
+        """Return the state, in which targets are kept for as many times as long as interpretation advises (IV.D)."""
+        return replace(state, advice=advice)
+
     def finish(self, state: ContourState) -> Report:
         """Return nothing: all has been said."""
         return Report()
 
     def _kept(
-        self, targets: Sequence[Target], frame: Frame, size: tuple[int, int], zones: Zones
+        self, targets: Sequence[Target], frame: Frame, state: ContourState
     ) -> tuple[list[Target], list[Mask], list[Event]]:
         """Return the objects that are still followed, their silhouettes, and what is told of the others."""
+        size, zones = state.size, state.zones
         kept, believed, events = [], [], []
         for one in targets:
             whole = silhouette_of(one, self._rules.group)
             seen = one.seen.box if one.missed == 0 and one.seen.area else None
             one = replace(one, last_seen=one.last_seen.after(zones, seen, whole.box))
             left = has_left(whole.box, size) and one.missed > 0 and one.last_seen.behind < 0
-            if one.missed > one.last_seen.kept(zones, self.patience, left) + 1e-9 or left or not whole.area:
+            patience = one.last_seen.kept(zones, self.patience, left) * float(state.advice.of(one.id))
+            if one.missed > patience + 1e-9 or left or not whole.area:
                 events.append(gone(one, frame, left, zones))
             else:
                 kept.append(one)

@@ -167,12 +167,12 @@ def recall(
     frame: Frame,
     size: tuple[int, int],
     zones: Zones,
-    limits: tuple[float, float],
+    limits: tuple[NDArray[np.float64], float],
 ) -> Recalled:
     """Find lost targets again among newcomers of whom there is a new look.
 
     A newcomer is one without an id, or who got one of late; a lost one was lost inside the picture before the newcomer
-    was seen first, and near enough to have got there. `limits` are the longest time in seconds for which one is
+    was seen first, and near enough to have got there. `limits` are the longest time (N,) in seconds for which each is
     remembered, and the least log odds.
     """
     longest, likeness = limits

@@ -28,6 +28,7 @@ from perdure.maths.jitter import Jitter
 from perdure.maths.jitter import learnt as surprised
 from perdure.params import parameter
 from perdure.scene import measuring
+from perdure.scene.advice import Advice
 from perdure.scene.backdrop import Backdrop
 from perdure.scene.context import Context, distance, nearest
 from perdure.scene.ground import Ground
@@ -70,6 +71,7 @@ class MultiFeatureState:
     fps: float
     ground: Ground | None  # where it lies, if it is known and wanted
     zones: Zones
+    advice: Advice = field(default_factory=Advice.none)  # how long who is kept, of interpretation
 
 
 @dataclass(frozen=True)
@@ -276,7 +278,7 @@ class MultiFeature:
             frame, regions, region, where, smooth, self.smooth * (1 - state.jitter.gain.mean()), state.size, zones
         )
         said = say(targets, state.next_id, unsaid, gaps, moment, self.confirm, self.least_way, self.window)
-        kept, left = self._retired(said.targets, region, regions.blind, frame, zones, state.size)
+        kept, left = self._retired(said.targets, region, regions.blind, frame, state)
         after = replace(
             state,
             targets=kept,
@@ -318,9 +320,13 @@ class MultiFeature:
         active = targets.missed <= self.window + 1e-9
         meetings = met(state.meetings, targets, where, active, frame)
         swapped = exchange(kinds, telling, targets, meetings, fresh, frame, self.exchange)
-        limits = (self.recall, self.likeness)
+        limits = (self.recall * state.advice.of(swapped.targets.ids), self.likeness)
         found = recall(kinds, telling, swapped.targets, region, fresh, frame, state.size, state.zones, limits)
         return telling, swapped.meetings, swapped, found
+
+    def heed(self, state: MultiFeatureState, advice: Advice) -> MultiFeatureState:
+        """Return the state, in which targets are kept for as many times as long as interpretation advises (IV.D)."""
+        return replace(state, advice=advice)
 
     def finish(self, state: MultiFeatureState) -> Report:
         """Return what is left to say: nothing."""
@@ -436,13 +442,15 @@ class MultiFeature:
         return new.replace(evidence=zones.evidence(new.last), entry=zones.first(new.last, "entry"))
 
     def _retired(
-        self, targets: Targets, region: Index, blind: bool, frame: Frame, zones: Zones, size: tuple[int, int]
+        self, targets: Targets, region: Index, blind: bool, frame: Frame, state: MultiFeatureState
     ) -> tuple[Targets, list[Event]]:
         """Let go of who made no link for the window (T2), or longer where looks or zones may find it again."""
+        zones, size = state.zones, state.size
         remembered = frame.image is not None and self.recall > self.window
         inside = (targets.looked[:, -1] > NEVER) & within(targets, size)
         usual = np.where(inside & remembered, self.recall, self.window).astype(np.float64)
         patience = zones.kept(targets.last, targets.behind, usual, ~within(targets, size))
+        patience = patience * state.advice.of(targets.ids)
         awaited = (targets.evidence > self.confirm) & (frame.time - targets.born >= self.confirm)
         awaited &= targets.missed <= self.confirm + 1e-9
         young = (region >= 0) | blind | awaited | (targets.missed <= self.gap + 1e-9)

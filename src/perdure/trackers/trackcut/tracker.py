@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from perdure.features.masks import silhouettes
 from perdure.maths.mixture import log_density
 from perdure.params import parameter
+from perdure.scene.advice import Advice
 from perdure.scene.backdrop import Backdrop, carried, learn
 from perdure.scene.whereabouts import Waiting
 from perdure.scene.zones import Zones, counting, renumbered
@@ -55,6 +56,7 @@ class TrackCutState:
     size: tuple[int, int]  # height, width
     backdrop: Backdrop  # in Lab, as `colours`
     zones: Zones
+    advice: Advice = field(default_factory=Advice.none)  # how long who is kept, of interpretation
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,8 @@ class TrackCut:
             seen = one.mask.box if one.missed == 0 else None
             one = replace(one, last_seen=one.last_seen.after(zones, seen, one.shape.box))
             out = has_left(one, state.size) and one.last_seen.behind < 0
-            if one.missing > one.last_seen.kept(zones, self.hidden_for, out) + 1e-9 or out:
+            patience = one.last_seen.kept(zones, self.hidden_for, out) * float(state.advice.of(one.id))
+            if one.missing > patience + 1e-9 or out:
                 events.append(gone(one, frame, state.size, zones))
             else:
                 kept.append(one)
@@ -173,6 +176,10 @@ class TrackCut:
             zones,
         )
         return state, Report(rows, events=tuple(events))
+
+    def heed(self, state: TrackCutState, advice: Advice) -> TrackCutState:
+        """Return the state, in which targets are kept for as many times as long as interpretation advises (IV.D)."""
+        return replace(state, advice=advice)
 
     def finish(self, state: TrackCutState) -> Report:
         """Return nothing: all has been said."""

@@ -1,0 +1,50 @@
+"""Events as they happen: a JSON object a line, for a pipe."""
+
+from __future__ import annotations
+
+import json
+from typing import IO
+
+from perdure.fold import Step
+from perdure.types import Event
+
+
+class LiveEvents:
+    """Writes the events of a run while it goes on.
+
+    A scenario that lasts is told twice: `"state": "begins"` when it is recognised, `"ends"` when it is over; what happens
+    in a moment, and what a tracker tells, once, as `"state": "happens"`. Ids are those of the moment: who turns out later
+    to be another is told in the run folder's `events.csv` alone.
+    """
+
+    def __init__(self, out: IO[str]) -> None:
+        self._out = out
+        self._lasting: set[tuple[str, tuple[int, ...], str]] = set()
+        self._time = 0.0
+
+    def tell(self, step: Step) -> None:
+        """Write what a step tells."""
+        self._time = self._time if step.frame is None else step.frame.time
+        for event in step.report.events:
+            key = (event.kind, event.ids, event.zone)
+            state = "ends" if key in self._lasting else "happens"
+            self._lasting.discard(key)
+            self._write(event, state)
+        for event in step.begun:
+            self._lasting.add((event.kind, event.ids, event.zone))
+            self._write(event, "begins")
+
+    def _write(self, event: Event, state: str) -> None:
+        value = {
+            "time": round(self._time, 3),
+            "state": state,
+            "kind": event.kind,
+            "begin": event.begin,
+            "end": event.end,
+            "ids": list(event.ids),
+            "zone": event.zone,
+            "confidence": event.confidence,
+            "why": event.why,
+        }
+        self._out.write(json.dumps(value, ensure_ascii=False) + "\n")
+        self._out.flush()
