@@ -47,7 +47,7 @@ _BORDER = 2.0  # px from the picture's edge, from which a box may be cut
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """A fuzzy set of numbers: 0 up to a, 1 from b to c, 0 from d on.
+    """A fuzzy set of numbers: 0 up to a, 1 from b to c, 0 from d on; an infinite end is never left.
 
     >>> Trapezoid(0, 1, 2, 4)(3)
     0.5
@@ -71,7 +71,8 @@ class Trapezoid:
             return 1.0
         if not self.a < value < self.d:
             return 0.0
-        return (value - self.a) / (self.b - self.a) if value < self.b else (self.d - value) / (self.d - self.c)
+        low, high = (self.a, self.b) if value < self.b else (self.d, self.c)
+        return 1.0 if math.isinf(low) else (value - low) / (high - low)
 
 
 Look = Mapping[str, Trapezoid]
