@@ -121,7 +121,7 @@ def test_feedback_without_scenarios_is_refused(yard: Path, tmp_path: Path):
 
 
 def test_scenarios_are_recognised_from_python(yard: Path, own: Path):
-    begun = [one for step in perdure.follow(yard, tracker="overlap", scenarios=own) for one in step.begun]
+    begun = [one for step in perdure.follow(yard, tracker="overlap", scenarios=own) for one in step.report.begun]
     assert [one.kind for one in begun] == ["hurries"]
     assert set(perdure.track(yard, tracker="overlap", scenarios="usual").ids.tolist()) == {1}
     assert set(perdure.track(yard, tracker="overlap", scenarios="usual", drop_noise=False).ids.tolist()) == {1, 2}

@@ -9,6 +9,7 @@ import pytest
 
 from perdure import params
 from perdure.detect import DETECTORS
+from perdure.interpret import Feedback
 from perdure.learn import Learning
 from perdure.trackers import TRACKERS
 
@@ -30,7 +31,9 @@ def test_every_option_that_the_documents_name_exists():
         for option in re.findall(r"(?<![\w-])--([a-z][a-z-]+)", page.read_text(encoding="utf-8"))
     }
     parameters = [
-        one for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning) for one in params.describe(kind)
+        one
+        for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning, Feedback)
+        for one in params.describe(kind)
     ]
     declared = {one.name.replace("_", "-") for one in parameters}
     declared |= {f"no-{one.name.replace('_', '-')}" for one in parameters if one.kind is bool}

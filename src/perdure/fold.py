@@ -73,7 +73,6 @@ class Step(NamedTuple):
     frame: Frame | None
     regions: Regions
     report: Report
-    begun: tuple[Event, ...] = ()  # scenarios that have been recognised and are still going on
 
 
 def detect(frames: Iterable[Frame], detector: Detector[Any], scene: Scene) -> Iterator[tuple[Frame, Regions]]:
@@ -109,18 +108,17 @@ def run(
     state, beliefs = detector.start(scene), tracker.start(scene)
     views = None if interpreter is None else interpreter.start()
     heed, advised = getattr(detector, "heed", None), getattr(tracker, "heed", None)
-    begun: tuple[Event, ...] = ()
     for frame in frames:
         state, regions = detector.step(state, frame)
         if wanted is not None:
             regions = wanted(regions)
         beliefs, report = tracker.step(beliefs, frame, regions)
         if interpreter is not None and views is not None:
-            views, (report, begun, advice) = interpreter.step(views, frame.index, frame.time, report)
+            views, report, advice = interpreter.step(views, frame.index, frame.time, report)
             beliefs = beliefs if advised is None else advised(beliefs, advice)
         if heed is not None:
             state = heed(state, report)
-        yield Step(frame, regions, _with_events(regions, report), begun)
+        yield Step(frame, regions, _with_events(regions, report))
     last = tracker.finish(beliefs)
     if interpreter is not None and views is not None:
         last = interpreter.finish(views, last)

@@ -43,14 +43,6 @@ class Feedback:
     drop_noise: bool = parameter(True, "whether targets that are taken for noise are taken back")
 
 
-class Interpreted(NamedTuple):
-    """A step of interpretation."""
-
-    report: Report  # of the tracker, with corrections and events
-    begun: tuple[Event, ...]  # what has been recognised and is still going on
-    advice: Advice
-
-
 @dataclass(frozen=True, eq=False)
 class InterpreterState:
     """What is known of everybody."""
@@ -65,6 +57,14 @@ class InterpreterState:
     interesting: tuple[int, ...]
     paths: Paths
     time: float
+
+
+class Interpreted(NamedTuple):
+    """A step of interpretation."""
+
+    state: InterpreterState
+    report: Report  # of the tracker, with corrections and events
+    advice: Advice
 
 
 @dataclass(frozen=True)
@@ -97,9 +97,7 @@ class Interpreter:
             (), (), 0.0, Recognition(), nothing, nothing, Tracks.empty(), nothing, Paths.none(), 0.0
         )
 
-    def step(
-        self, state: InterpreterState, frame: int, time: float, report: Report
-    ) -> tuple[InterpreterState, Interpreted]:
+    def step(self, state: InterpreterState, frame: int, time: float, report: Report) -> Interpreted:
         """Return the state after a frame's report, and the report with what interpretation adds and takes back."""
         rows, paths = report.rows, state.paths
         if self.ground is not None:
@@ -132,8 +130,8 @@ class Interpreter:
             time,
         )
         told = (*report.events, *events, *corrections)
-        said = replace(report, rows=rows, dropped=(*report.dropped, *dropped), events=told)
-        return after, Interpreted(said, begun, self._advice(noise, interesting))
+        said = replace(report, rows=rows, dropped=(*report.dropped, *dropped), events=told, begun=begun)
+        return Interpreted(after, said, self._advice(noise, interesting))
 
     def finish(self, state: InterpreterState, report: Report) -> Report:
         """Return the tracker's last report with what is over because the video is; who was lost then is judged, too."""
@@ -271,8 +269,8 @@ def over_run(interpreter: Interpreter, rows: Tracks, frames: Sequence[int], time
     for frame, time, begin, stop in zip(frames, times, begins.tolist(), stops.tolist(), strict=True):
         over = (Event("lost", frame, frame, (one,)) for one in gone)
         report = Report(rows.take(np.arange(begin, stop)), events=tuple(over))
-        state, step = alone.step(state, frame, time, report)
-        events += [one for one in step.report.events if one not in report.events]
+        state, said, _ = alone.step(state, frame, time, report)
+        events += [one for one in said.events if one not in report.events]
         known |= {life.id: belief for life, belief in zip(state.lives, state.beliefs, strict=True)}
         gone = ends.get(frame, [])
     events += alone.finish(state, Report.empty()).events

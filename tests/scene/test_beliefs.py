@@ -123,6 +123,15 @@ def test_boxes_cut_by_the_border_do_not_tell_the_size():
     assert measured(life(rows), (100, 200))["ratio"] == pytest.approx(2.0)
 
 
+def test_who_is_cut_by_the_border_all_the_time_is_no_noise():
+    rows = [row(k, x=4 + 2 * (k % 2), size=(8 + 4 * (k % 2), 20)) for k in range(30)]
+    found = measured(life(rows, gone=True), (100, 200))
+    assert math.isnan(found["reach"])
+    assert beliefs(found, USUAL).of[NOISE] == 0
+    inside = measured(life([row(k, size=(8 + 4 * (k % 2), 20)) for k in range(30)], gone=True), (100, 200))
+    assert beliefs(inside, USUAL).of[NOISE] == 1
+
+
 def test_on_the_ground_speed_is_in_metres_a_second():
     rows = [row(k, x=20 + k, ground=[Ground(0.1 * k, 0.0, 1.0)]) for k in range(20)]
     found = measured(life(rows), (100, 200), heights=[1.7] * 20)

@@ -30,7 +30,7 @@ class LiveEvents:
             state = "ends" if key in self._lasting else "happens"
             self._lasting.discard(key)
             self._write(event, state)
-        for event in step.begun:
+        for event in step.report.begun:
             self._lasting.add((event.kind, event.ids, event.zone))
             self._write(event, "begins")
 

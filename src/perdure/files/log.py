@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -89,6 +89,8 @@ def report_to_json(frame: int, time: float, report: Report) -> Json:
         value["dropped"] = [[one.id, one.begin, one.end] for one in report.dropped]
     if report.events:
         value["events"] = [dataclasses.asdict(one) for one in report.events]
+    if report.begun:
+        value["begun"] = [dataclasses.asdict(one) for one in report.begun]
     if report.explanations:
         value["explanations"] = [
             {"id": one.id, "why": one.why, "figures": dict(one.figures)} for one in report.explanations
@@ -103,9 +105,14 @@ def report_of_json(value: Mapping[str, Json], with_masks: bool = True) -> Report
         rows=_rows_of_json(value["rows"], frame, time, with_masks),
         renamed=tuple(Renamed(*map(int, one)) for one in value.get("renamed", ())),
         dropped=tuple(Dropped(*map(int, one)) for one in value.get("dropped", ())),
-        events=tuple(Event(**{**one, "ids": tuple(map(int, one["ids"]))}) for one in value.get("events", ())),
+        events=_events_of_json(value.get("events", ())),
+        begun=_events_of_json(value.get("begun", ())),
         explanations=tuple(Explanation(**one) for one in value.get("explanations", ())),
     )
+
+
+def _events_of_json(value: Iterable[Mapping[str, Json]]) -> tuple[Event, ...]:
+    return tuple(Event(**{**one, "ids": tuple(map(int, one["ids"]))}) for one in value)
 
 
 def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:

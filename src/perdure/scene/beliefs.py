@@ -16,10 +16,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from perdure.errors import ParameterError
 from perdure.params import unknown_name
 from perdure.scene.lives import HEIGHT, SEEN, SPEED, WIDTH, Life
 
+Float = NDArray[np.float64]
 NOISE = "noise"
 INF = math.inf
 MEASURES: Mapping[str, str] = {
@@ -164,6 +168,8 @@ def _fit(look: Look, measures: Mapping[str, float]) -> tuple[float, str]:
 def measured(life: Life, size: tuple[int, int], heights: Sequence[float] = ()) -> dict[str, float]:
     """Return the measures of a life, NaN where one is not known.
 
+    Of one whom the picture's border cuts most of the time nobody knows how far it moves, or how it changes.
+
     Parameters
     ----------
     life : Life
@@ -174,9 +180,10 @@ def measured(life: Life, size: tuple[int, int], heights: Sequence[float] = ()) -
         Its height in metres in the rows of its path, where the ground is known.
     """
     path, (high, wide) = life.path, size
-    whole = path[(path[:, SEEN] > 0) & _uncut(path, high, wide)]
-    if not len(whole):
-        whole = path[path[:, SEEN] > 0] if (path[:, SEEN] > 0).any() else path
+    seen = path[path[:, SEEN] > 0]
+    uncut = seen[_uncut(seen, high, wide)]
+    cut = 2 * len(uncut) < len(seen)
+    whole = next(some for some in (uncut, seen, path) if len(some))
     width, height = (_median(whole[:, column]) for column in (WIDTH, HEIGHT))
     scale = max(math.sqrt(width * height), 1.0)
     metres = _median([one for one in heights if math.isfinite(one)])
@@ -194,22 +201,23 @@ def measured(life: Life, size: tuple[int, int], heights: Sequence[float] = ()) -
         "age": life.age,
         "lifetime": life.age if life.gone else math.nan,
         "way": life.way / scale,
-        "reach": life.reach / scale,
+        "reach": math.nan if cut else life.reach / scale,
         "straightness": min(1.0, net / life.way) if life.way > 0 else math.nan,
-        "restless": life.restless / life.compared if life.compared >= _LEAST_COMPARED else math.nan,
+        "restless": math.nan if cut or life.compared < _LEAST_COMPARED else life.restless / life.compared,
         "presence": life.seen / max(life.frames, life.seen, 1),
     }
 
 
-def _uncut(path, high: int, wide: int):  # type: ignore[no-untyped-def]
+def _uncut(path: Float, high: int, wide: int) -> NDArray[np.bool_]:
+    """Which rows of a path (T, 10) have boxes that the picture's border does not cut."""
     left, right = path[:, 2] - path[:, WIDTH] / 2, path[:, 2] + path[:, WIDTH] / 2
     top, bottom = path[:, 3] - path[:, HEIGHT], path[:, 3]
-    return (left >= _BORDER) & (right <= wide - _BORDER) & (top >= _BORDER) & (bottom <= high - _BORDER)
+    return np.asarray(
+        (left >= _BORDER) & (right <= wide - _BORDER) & (top >= _BORDER) & (bottom <= high - _BORDER)
+    )
 
 
-def _median(values: object) -> float:
-    import numpy as np
-
+def _median(values: ArrayLike) -> float:
     some = np.asarray(values, np.float64)
     return float(np.median(some)) if some.size else math.nan
 

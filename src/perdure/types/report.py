@@ -61,6 +61,7 @@ class Report:
     dropped: tuple[Dropped, ...] = ()
     events: tuple[Event, ...] = ()
     explanations: tuple[Explanation, ...] = ()
+    begun: tuple[Event, ...] = ()  # scenarios that are recognised and go on; told as events when they are over
 
     @staticmethod
     def empty() -> Report:
@@ -71,5 +72,5 @@ class Report:
         """Return whether both report the same."""
         return self.rows.equals(other.rows) and all(
             getattr(self, name) == getattr(other, name)
-            for name in ("renamed", "dropped", "events", "explanations")
+            for name in ("renamed", "dropped", "events", "explanations", "begun")
         )
