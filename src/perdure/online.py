@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from perdure import params
 from perdure.equipment import AnyContext, equipped
@@ -17,7 +17,8 @@ from perdure.errors import ParameterError
 from perdure.files.zones import read_zones
 from perdure.scene.zones import Zones
 from perdure.trackers import TRACKERS
-from perdure.types import Frame, Mask, Regions, Report, Scene, Tracks
+from perdure.types import Frame, Regions, Report, Scene, Tracks
+from perdure.types.detections import to_regions
 
 if TYPE_CHECKING:
     import supervision
@@ -144,46 +145,6 @@ class Online:
         return scene if self._zones is None else replace(scene, zones=self._zones.zones, rules=self._zones.rules)
 
 
-def to_regions(detections: Any) -> Regions:
-    """Return detections of any known kind as regions, order and data kept."""
-    if isinstance(detections, Regions):
-        return detections
-    try:
-        if hasattr(detections, "xyxy") and hasattr(detections, "tracker_id"):
-            return _of_supervision(detections)
-        return _of_array(detections)
-    except ValueError as error:
-        raise ParameterError(f"these detections cannot be: {error}") from error
-
-
-def _of_array(values: ArrayLike) -> Regions:
-    try:
-        table = np.asarray(values, np.float32)
-    except (TypeError, ValueError) as error:
-        raise ParameterError(f"detections of {type(values).__name__} are not known; give {_KINDS}") from error
-    table = table.reshape(0, 4) if table.size == 0 else table
-    if table.ndim != 2 or not 4 <= table.shape[1] <= 6:
-        raise ParameterError(f"detections of shape {table.shape} are not known; give {_KINDS}")
-    if not np.isfinite(table).all():
-        raise ParameterError("detections hold a number that is not finite")
-    classes = [f"{number:g}" for number in table[:, 5]] if table.shape[1] > 5 else None
-    return Regions.of(table[:, :4], table[:, 4] if table.shape[1] > 4 else None, classes)
-
-
-def _of_supervision(detections: supervision.Detections) -> Regions:
-    count = len(detections)
-    named = detections.data.get("class_name")
-    classes: Any = named
-    if named is None and detections.class_id is not None:
-        classes = [str(number) for number in detections.class_id]
-    masks = None
-    if detections.mask is not None:
-        masks = [Mask.of_image(np.asarray(bits, np.bool_)) for bits in detections.mask]
-    return Regions.of(
-        np.asarray(detections.xyxy, np.float32).reshape(count, 4), detections.confidence, classes, masks
-    )
-
-
 def _with_ids(detections: supervision.Detections, rows: Tracks) -> Any:
     ids = np.full(len(detections), -1, dtype=int)
     for identity, links in zip(rows.ids, rows.links, strict=True):
@@ -193,5 +154,4 @@ def _with_ids(detections: supervision.Detections, rows: Tracks) -> Any:
     return named
 
 
-_KINDS = "supervision.Detections, perdure.Regions or an array (N, 4 to 6) of x1, y1, x2, y2, score, class"
 _UNBOUNDED = 1 << 20  # px: a picture whose size nobody told

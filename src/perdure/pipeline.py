@@ -16,15 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure import equipment, fold, params
-from perdure.detect import DETECTORS, Mark, Marked, Recorded, WithMarks
+from perdure.detect import DETECTORS, Mark, Marked, WithMarks
+from perdure.detect.plausible import left_out
+from perdure.detection import AnyDetector, check_classes, detector_name, kinds_of, made_detector, recorded
 from perdure.equipment import AnyContext, equipped
-from perdure.errors import DamagedVideo, FormatError, ParameterError
+from perdure.errors import DamagedVideo, ParameterError
 from perdure.files.calibration import read_calibration
 from perdure.files.marks import AnyMark, read_marks, words_of
-from perdure.files.regions import read_regions
 from perdure.files.roi import read_roi
 from perdure.files.scenarios import read_rules
-from perdure.files.shapes import filled, is_file
+from perdure.files.shapes import filled
 from perdure.files.video import Source, open_source
 from perdure.files.zones import read_zones
 from perdure.interpret import Feedback, Interpreter
@@ -79,6 +80,7 @@ class Plan:
             raise ParameterError(
                 "the background detector names no classes; leave out --class or give --detector FILE"
             )
+        check_classes(self.detector, self.classes)
 
     def prepared(self) -> Plan:
         """Return the plan with the first looks over the source taken: the detector's, and that for the ground."""
@@ -149,13 +151,14 @@ class Plan:
 
     def _of_detections(self) -> tuple[str, ...]:
         """What the user should know about his file of detections."""
-        if not isinstance(self.detector, Recorded) or not self.source.count:
+        detector = recorded(self.detector)
+        if detector is None or not self.source.count:
             return ()
-        frames, count = self.detector.regions.keys(), self.source.count
+        frames, count = detector.regions.keys(), self.source.count
         if not frames:
             return ("the file of detections is empty",)
         if self.classes:
-            there = {str(name) for index in islice(frames, 500) for name in self.detector.regions[index].classes}
+            there = {str(name) for index in islice(frames, 500) for name in detector.regions[index].classes}
             if there.isdisjoint(self.classes):
                 return (
                     f"no region is of class {', '.join(self.classes)}; there are {', '.join(sorted(there)) or 'none'}",
@@ -196,7 +199,9 @@ def plan(
     source: AnySource,
     *,
     tracker: str | None = None,
-    detector: str | Path | None = None,
+    detector: AnyDetector | None = None,
+    box_masks: str | None = None,
+    class_names: str | Path | Sequence[str] | None = None,
     init: AnyMark | Sequence[AnyMark] | None = None,
     fps: float | None = None,
     start: str | float | None = None,
@@ -220,9 +225,14 @@ def plan(
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     tracker : str or None
         A name of `perdure.trackers.TRACKERS`; None for 'compound', or with `init` for the first that follows marks.
-    detector : str, Path or None
-        'background', 'people', or a file of regions (`.jsonl` of `perdure detect`, or MOTChallenge `.txt`);
-        None for the background, or for `det/det.txt` of a MOTChallenge folder without images.
+    detector : str, Path, function, detector or None
+        'background', 'people', 'onnx:FILE' or 'openvino:FILE' (a network), a file of regions (`.jsonl` of `perdure
+        detect`, or MOTChallenge `.txt`), a function of a picture (`perdure.detect.Called`), or a detector with its
+        parameters; None for the background, or for `det/det.txt` of a MOTChallenge folder without images.
+    box_masks : str or None
+        Silhouettes for a detector's boxes: 'background', by a background model, or 'cut', by colours; None: none.
+    class_names : str, Path, sequence of str or None
+        The names of a network's classes from number 0, or a file with one a line; None: those that it tells itself.
     init : str, Path, (H, W) array of whole numbers, pair of one of these and its frame, or list of these
         What the user marked, an index PNG or array (the value is the id, 0 nothing), a box 'x,y,w,h' or a polygon
         'x,y x,y x,y …', with '@FRAME' behind a text for another frame than 0. Where no detector is named there is
@@ -271,12 +281,10 @@ def plan(
             detector, name = _own_detections(opened), "recorded"
         rules = scenarios if isinstance(scenarios, Rules) or scenarios is None else read_rules(scenarios)
         of_feedback, others = _of_feedback(parameters or {}, rules)
-        of_tracker, of_detector = split(others, tracker, name)
+        of_tracker, of_detector = split(others, tracker, name, box_masks)
         made_tracker = params.build(TRACKERS[tracker], of_tracker)
         made_tracker = equipped(made_tracker, tracker, context, embedding)
-        made_detector = params.build(DETECTORS[name], of_detector)
-        if name == "recorded":
-            made_detector = dataclasses.replace(made_detector, regions=read_regions(Path(str(detector))))
+        seeing = made_detector(detector, name, of_detector, class_names, box_masks)
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
         body = _body(opened, calibration, object_height)
         if calibration is not None and not body:
@@ -291,7 +299,7 @@ def plan(
             _refuse_late_start(opened, start)
             marks = read_marks(init, scene, opened.wanted)
         if name == "marked":
-            made_detector, marks = Marked(marks=marks), ()
+            seeing, marks = Marked(marks=marks), ()
         if marks and follows_marks(made_tracker):
             made_tracker = dataclasses.replace(made_tracker, reserved=max(mark.id for mark in marks))
         wanted = (classes,) if isinstance(classes, str) else tuple(classes or ())
@@ -299,7 +307,7 @@ def plan(
             opened,
             scene,
             name,
-            made_detector,
+            seeing,
             tracker,
             made_tracker,
             wanted,
@@ -358,7 +366,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, init, fps, start, end, stride, roi, zones, calibration, object_height,
+        Those of `plan`: tracker, detector, box_masks, class_names, init, fps, start, end, stride, roi, zones, calibration, object_height,
         classes, context, embedding, scenarios; and parameters of the detector and the tracker by name.
 
     Raises
@@ -379,6 +387,8 @@ def track(source: AnySource, **options: Any) -> Tracks:
         warnings.warn(str(damage), RuntimeWarning, stacklevel=2)
     finally:
         made.source.close()
+    for note in left_out(event for report in reports for event in report.events).notes:
+        warnings.warn(note, RuntimeWarning, stacklevel=2)
     return fold.settle(reports)
 
 
@@ -406,20 +416,6 @@ def zoned(scene: Scene, zones: str | Path | Zones) -> Scene:
         seen = ~filled(ignored, scene.width, scene.height)
         roi = seen if roi is None else roi & seen
     return dataclasses.replace(scene, zones=zones.zones, rules=zones.rules, roi=roi)
-
-
-def detector_name(detector: str | Path | None) -> str:
-    """Return which kind of detector the user's word means."""
-    if detector is None:
-        return "background"
-    if str(detector) in ("background", "people"):
-        return str(detector)
-    if is_file(detector):
-        return "recorded"
-    if Path(str(detector)).suffix in (".txt", ".jsonl", ".csv"):
-        raise FormatError(f"{detector}: there is no such file of detections")
-    known = [name for name in DETECTORS if name not in ("recorded", "marked")]
-    raise ParameterError(f"{params.unknown_name('detector', str(detector), known)}, or name a file of detections")
 
 
 def follows_marks(tracker: object) -> bool:
@@ -450,8 +446,8 @@ class Split(NamedTuple):
     detector: dict[str, object]
 
 
-def split(given: Mapping[str, object], tracker: str, detector: str) -> Split:
-    """Divide named values between tracker and detector.
+def split(given: Mapping[str, object], tracker: str, detector: str, box_masks: str | None = None) -> Split:
+    """Divide named values between tracker and detector, and the background model that makes silhouettes of its boxes.
 
     Raises
     ------
@@ -460,7 +456,8 @@ def split(given: Mapping[str, object], tracker: str, detector: str) -> Split:
     """
     owners = {
         one.name: part
-        for part, kind in (("tracker", TRACKERS[tracker]), ("detector", DETECTORS[detector]))
+        for part, kinds in (("tracker", [TRACKERS[tracker]]), ("detector", kinds_of(detector, box_masks)))
+        for kind in kinds
         for one in params.describe(kind)
     }
     if not isinstance(given, Mapping):
@@ -505,6 +502,8 @@ _OPTIONS = frozenset(
     (
         "tracker",
         "detector",
+        "box_masks",
+        "class_names",
         "init",
         "fps",
         "start",

@@ -14,6 +14,7 @@ from perdure.cli import options
 from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
+from perdure.detect.plausible import LeftOut, left_out
 from perdure.files.regions import check_ending, write_regions
 from perdure.files.whole import refuse_existing
 from perdure.pipeline import plan
@@ -31,6 +32,8 @@ def detect(
     ],
     chosen: dict[str, object],
     detector: options.DetectorOption = None,
+    box_masks: options.BoxMasksOption = None,
+    class_names: options.ClassNamesOption = None,
     roi: options.RoiOption = None,
     class_: options.ClassOption = None,
     fps: options.FpsOption = None,
@@ -47,6 +50,8 @@ def detect(
     made = plan(
         source,
         detector=detector,
+        box_masks=box_masks,
+        class_names=class_names,
         fps=fps,
         start=start,
         end=end,
@@ -55,19 +60,19 @@ def detect(
         classes=class_ or (),
         parameters=options.read_parameters(parameters, chosen),
     )
-    frames = 0
+    frames, unusable = 0, LeftOut()
 
     def counted(seen: Iterator[tuple[Frame, Regions]]) -> Iterator[tuple[Frame, Regions]]:
-        nonlocal frames
-        for one in seen:
-            frames += 1
-            yield one
+        nonlocal frames, unusable
+        for frame, regions in seen:
+            frames, unusable = frames + 1, left_out(regions.events, unusable)
+            yield frame, regions
 
     with Ending() as ending:
         watched_frames = ending.frames(watched(made.source, f"detecting in {made.source.name}", made.source.count))
         count = write_regions(output, counted(ending.first_look(made).seen(watched_frames)))
     made.source.close()
-    for warning in made.source.warnings:
+    for warning in (*made.source.warnings, *unusable.notes):
         print(f"perdure: note: {warning}", file=sys.stderr)
     if json_:
         print(json.dumps({"status": ending.status, "output": str(output), "frames": frames, "regions": count}))

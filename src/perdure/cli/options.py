@@ -135,8 +135,29 @@ DetectorOption = Annotated[
     typer.Option(
         "--detector",
         metavar="NAME|FILE",
-        help="'background' needs nothing; 'people' finds upright people in each picture by itself; or a file of regions: .jsonl of `perdure detect`, MOTChallenge .txt. "
+        help="'background' needs nothing; 'people' finds upright people in each picture by itself; 'onnx:FILE' and "
+        "'openvino:FILE' are networks; or a file of regions: .jsonl of `perdure detect`, MOTChallenge .txt. "
         "Default: background, or det/det.txt of a MOTChallenge folder without images.",
+        show_default=False,
+    ),
+]
+ClassNamesOption = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--class-names",
+        metavar="FILE",
+        help="The names of a network's classes, one a line, the first that of number 0. Default: those that its file "
+        "tells, COCO's for 80 classes, else numbers.",
+        show_default=False,
+    ),
+]
+BoxMasksOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--box-masks",
+        metavar="none|background|cut",
+        help="Silhouettes for a detector that gives boxes: 'background', what differs from a background model that "
+        "is learnt beside it (fixed camera); 'cut', what its colours tell from what lies around the box (slow).",
         show_default=False,
     ),
 ]

@@ -20,6 +20,9 @@ from perdure.cli.film import draw_film, drawn_while_running
 from perdure.cli.progress import watched
 from perdure.cli.stopping import Ending
 from perdure.detect import DETECTORS
+from perdure.detect.plausible import LeftOut, left_out
+from perdure.detection import about as about_detector
+from perdure.detection import file_of
 from perdure.equipment import chosen_by
 from perdure.errors import OutputError, ParameterError
 from perdure.files.calibration import value_of
@@ -61,6 +64,8 @@ def track(
         ),
     ] = None,
     detector: options.DetectorOption = None,
+    box_masks: options.BoxMasksOption = None,
+    class_names: options.ClassNamesOption = None,
     init: options.InitOption = None,
     roi: options.RoiOption = None,
     calibration: options.CalibrationOption = None,
@@ -101,6 +106,8 @@ def track(
         source,
         tracker=tracker,
         detector=detector,
+        box_masks=box_masks,
+        class_names=class_names,
         init=init,
         fps=fps,
         start=start,
@@ -119,7 +126,18 @@ def track(
     place = output or Path("perdure-runs") / made.source.name
     inputs = [
         Path(one)
-        for one in (source, detector, roi, zones, calibration, parameters, embedding, scenarios, *(context or ()))
+        for one in (
+            source,
+            file_of(detector),
+            class_names,
+            roi,
+            zones,
+            calibration,
+            parameters,
+            embedding,
+            scenarios,
+            *(context or ()),
+        )
         if one is not None and is_file(one)
     ]
     folder = RunFolder.create(place, overwrite=overwrite, inputs=inputs)
@@ -199,7 +217,7 @@ def _run(
 ) -> Outcome:
     begun = time.monotonic()
     live_film = film and not made.source.rereadable
-    context = ""
+    context, unusable = "", LeftOut()
     with RunLog(folder.log) as log:
         frames = ending.frames(watched(made.source, f"tracking {made.source.name}", made.source.count))
         made = ending.first_look(made)
@@ -208,6 +226,7 @@ def _run(
         if live_film:
             steps = drawn_while_running(steps, made.scene, folder.film)
         for step in steps:
+            unusable = left_out(step.regions.events, unusable)
             context = next(filter(None, (chosen_by(made.tracker, one) for one in step.report.events)), context)
             if live is not None:
                 live.tell(step)
@@ -215,7 +234,7 @@ def _run(
     totals = folder.write_results(reporting)
     tracked = time.monotonic()
     status, message = ending.status, str(ending.damage or "")
-    warnings = (*made.source.warnings, *made.notes())
+    warnings = (*made.source.warnings, *made.notes(), *unusable.notes)
     about |= equipment.about(made.tracker, made.contexts, context)
     about |= {"frames": counted.frames, "warnings": list(warnings), **dataclasses.asdict(totals)}
     folder.write_about({**about, "status": status, "message": message})
@@ -290,7 +309,7 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "fps": source.fps,
         "window": window,
         "classes": list(made.classes),
-        "detector": {"name": made.detector_name, "parameters": params.values(made.detector)},
+        "detector": about_detector(made.detector, made.detector_name),
         "init": list(made.init),
         "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
         **equipment.about(made.tracker, made.contexts),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from perdure.features.boxes import centres
+from perdure.detect.plausible import centred_in
 from perdure.params import parameter
 from perdure.types import Frame, Regions, Scene
 
@@ -49,8 +49,5 @@ class Recorded:
             regions = dataclasses.replace(regions, events=(*skipped, *regions.events))
         state = dataclasses.replace(state, next=frame.index + 1)
         kept = regions.scores >= self.least_score
-        if state.roi is not None and len(regions):
-            height, width = state.roi.shape
-            x, y = np.clip(centres(regions.boxes), 0, (width - 1, height - 1)).astype(np.intp).T
-            kept = kept & state.roi[y, x]
+        kept = kept & centred_in(regions.boxes, state.roi)
         return state, regions if kept.all() else regions.take(kept)

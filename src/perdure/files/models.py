@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,22 +44,59 @@ def read_embedding(path: str | Path) -> Model:
     FormatError
         Naming the file and what is wrong with it.
     """
-    place = Path(path)
+    return _of_session(Path(path), open_session(Path(path)))
+
+
+def open_session(place: Path, threads: int = 1) -> Any:
+    """Open an ONNX file in onnxruntime, on the CPU; one thread makes the same sums in any process.
+
+    Raises
+    ------
+    ParameterError
+        If onnxruntime is not installed.
+    FormatError
+        Naming the file and what is wrong with it: not there, a folder, not whole, nothing that onnxruntime can run.
+    """
     try:
         import onnxruntime
     except ImportError:
         raise ParameterError(f"the model {place} needs onnxruntime; pip install 'perdure[onnx]'") from None
-    if not place.is_file():
-        raise FormatError(f"cannot read the model {place}: there is no such file")
+    check_model_file(place, ".onnx")
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1  # the same sums in any process
+    options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
+    options.use_deterministic_compute = True
     options.log_severity_level = 4
     try:
-        session = onnxruntime.InferenceSession(str(place), options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(str(place), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has an exception for each of its codes, with no root but this
-        reason = str(error).splitlines()[0][:160] if str(error) else type(error).__name__
-        raise FormatError(f"{place}: not a whole ONNX model ({reason})") from None
-    return _of_session(place, session)
+        raise FormatError(f"{place}: {_why_not(error, onnxruntime.__version__)}") from None
+
+
+def check_model_file(place: Path, ending: str) -> None:
+    """Refuse what is no file with something in it."""
+    try:
+        if place.is_dir():
+            raise FormatError(f"the model {place} is a folder; name the {ending} file in it")
+        if not place.is_file():
+            raise FormatError(f"cannot read the model {place}: there is no such file")
+        with place.open("rb") as file:
+            if not file.read(1):
+                raise FormatError(f"the model {place} is empty (0 bytes): the download or the copy failed")
+    except (OSError, ValueError) as error:
+        raise FormatError(
+            f"cannot read the model {str(place)[:200]}: {getattr(error, 'strerror', error)}"
+        ) from None
+
+
+def _why_not(error: Exception, version: str) -> str:
+    """Why onnxruntime does not take a file, in words of ours where they can be found."""
+    said = str(error)
+    if type(error).__name__ == "InvalidProtobuf" or "No graph was found" in said:
+        return "not a whole ONNX model: the file is cut off, or of another kind"
+    reason = re.sub(
+        r"^\[ONNXRuntimeError\] : \d+ : \w+ : |Load model from .*? failed:", "", " ".join(said.split())
+    )
+    return f"onnxruntime {version} cannot run this model: {reason[:200] or type(error).__name__}"
 
 
 def _of_session(place: Path, session: Any) -> Model:
