@@ -108,7 +108,7 @@ def made_detector(
     if box_masks is not None and box_masks not in KINDS:
         raise ParameterError(f"box_masks = {box_masks!r} is not known: it must be {' or '.join(KINDS)}")
     parts = [params.build(kind, _of_kind(kind, given)) for kind in kinds_of(name, box_masks)]
-    made = parts[0] if name in DETECTORS else detector
+    made: Any = parts[0] if name in DETECTORS else detector
     if name == "recorded":
         made = dataclasses.replace(made, regions=read_regions(Path(str(detector))))
     elif name == "function":

@@ -28,6 +28,7 @@ from perdure.files.scenarios import read_rules
 from perdure.files.shapes import filled
 from perdure.files.video import Source, open_source
 from perdure.files.zones import read_zones
+from perdure.foreign import AnySettings, made_foreign
 from perdure.interpret import Feedback, Interpreter
 from perdure.scene.ground import Ground
 from perdure.scene.perspective import BODY, Estimate, estimate
@@ -199,6 +200,8 @@ def plan(
     source: AnySource,
     *,
     tracker: str | None = None,
+    tracker_settings: AnySettings | None = None,
+    tracker_environment: str | Path | None = None,
     detector: AnyDetector | None = None,
     box_masks: str | None = None,
     class_names: str | Path | Sequence[str] | None = None,
@@ -224,7 +227,11 @@ def plan(
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     tracker : str or None
-        A name of `perdure.trackers.TRACKERS`; None for 'compound', or with `init` for the first that follows marks.
+        A name of `perdure.trackers.TRACKERS`, or LIBRARY:CLASS of another library ('trackers:ByteTrackTracker',
+        'norfair:Tracker'); None for 'compound', or with `init` for the first that follows marks.
+    tracker_settings, tracker_environment
+        Of another library's tracker: arguments by name, as a mapping, JSON or a file of it; and the folder of the
+        environment that has it, None for $PERDURE_PEERS, else this one.
     detector : str, Path, function, detector or None
         'background', 'people', 'onnx:FILE' or 'openvino:FILE' (a network), a file of regions (`.jsonl` of `perdure
         detect`, or MOTChallenge `.txt`), a function of a picture (`perdure.detect.Called`), or a detector with its
@@ -272,7 +279,8 @@ def plan(
     """
     words = () if init is None else words_of(init)
     tracker = _default_tracker(marked=bool(words)) if tracker is None else tracker
-    if not isinstance(tracker, str) or tracker not in TRACKERS:
+    foreign = made_foreign(tracker, tracker_settings, tracker_environment)
+    if foreign is None and (not isinstance(tracker, str) or tracker not in TRACKERS):
         raise ParameterError(params.unknown_name("tracker", tracker, TRACKERS))
     name = "marked" if words and detector is None else detector_name(detector)
     opened = open_source(source, fps=fps, start=start, end=end, stride=stride)
@@ -282,7 +290,7 @@ def plan(
         rules = scenarios if isinstance(scenarios, Rules) or scenarios is None else read_rules(scenarios)
         of_feedback, others = _of_feedback(parameters or {}, rules)
         of_tracker, of_detector = split(others, tracker, name, box_masks)
-        made_tracker = params.build(TRACKERS[tracker], of_tracker)
+        made_tracker = params.build(TRACKERS[tracker], of_tracker) if foreign is None else foreign
         made_tracker = equipped(made_tracker, tracker, context, embedding)
         seeing = made_detector(detector, name, of_detector, class_names, box_masks)
         scene = opened.scene(None if roi is None else read_roi(roi, opened.width, opened.height))
@@ -366,7 +374,7 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, detector, box_masks, class_names, init, fps, start, end, stride, roi, zones, calibration, object_height,
+        Those of `plan`: tracker, tracker_settings, tracker_environment, detector, box_masks, class_names, init, fps, start, end, stride, roi, zones, calibration, object_height,
         classes, context, embedding, scenarios; and parameters of the detector and the tracker by name.
 
     Raises
@@ -454,9 +462,10 @@ def split(given: Mapping[str, object], tracker: str, detector: str, box_masks: s
     ParameterError
         For a name that neither has, with who has it or the nearest one.
     """
+    ours = [TRACKERS[tracker]] if tracker in TRACKERS else []
     owners = {
         one.name: part
-        for part, kinds in (("tracker", [TRACKERS[tracker]]), ("detector", kinds_of(detector, box_masks)))
+        for part, kinds in (("tracker", ours), ("detector", kinds_of(detector, box_masks)))
         for kind in kinds
         for one in params.describe(kind)
     }
@@ -501,6 +510,8 @@ def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
 _OPTIONS = frozenset(
     (
         "tracker",
+        "tracker_settings",
+        "tracker_environment",
         "detector",
         "box_masks",
         "class_names",

@@ -141,6 +141,25 @@ DetectorOption = Annotated[
         show_default=False,
     ),
 ]
+TrackerSettingsOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        "--tracker-settings",
+        metavar="JSON|FILE",
+        help="Arguments of another library's tracker, as a JSON object or a file of one; 'fps' stands for the "
+        "source's frames per second.",
+        show_default=False,
+    ),
+]
+TrackerEnvironmentOption = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--tracker-environment",
+        metavar="DIR",
+        help="The virtual environment that has the other library. Default: $PERDURE_PEERS, else this one.",
+        show_default=False,
+    ),
+]
 ClassNamesOption = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option(

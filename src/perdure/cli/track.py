@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from perdure import equipment, params
+from perdure import equipment, foreign, params
 from perdure.cli import options
 from perdure.cli.film import draw_film, drawn_while_running
 from perdure.cli.progress import watched
@@ -59,10 +59,13 @@ def track(
         str | None,
         typer.Option(
             metavar="NAME",
-            help=f"One of: {', '.join(TRACKERS)}. Default: compound; with --init, the first that follows marks.",
+            help=f"One of: {', '.join(TRACKERS)}; or one of another library, as trackers:CLASS or norfair:CLASS. "
+            "Default: compound; with --init, the first that follows marks.",
             show_default=False,
         ),
     ] = None,
+    tracker_settings: options.TrackerSettingsOption = None,
+    tracker_environment: options.TrackerEnvironmentOption = None,
     detector: options.DetectorOption = None,
     box_masks: options.BoxMasksOption = None,
     class_names: options.ClassNamesOption = None,
@@ -105,6 +108,8 @@ def track(
     made = plan(
         source,
         tracker=tracker,
+        tracker_settings=tracker_settings,
+        tracker_environment=tracker_environment,
         detector=detector,
         box_masks=box_masks,
         class_names=class_names,
@@ -311,7 +316,11 @@ def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str
         "classes": list(made.classes),
         "detector": about_detector(made.detector, made.detector_name),
         "init": list(made.init),
-        "tracker": {"name": made.tracker_name, "parameters": params.values(made.tracker)},
+        "tracker": {
+            "name": made.tracker_name,
+            "parameters": params.values(made.tracker),
+            **foreign.about(made.tracker),
+        },
         **equipment.about(made.tracker, made.contexts),
         **({"embedding": made.tracker.network.name} if getattr(made.tracker, "network", None) else {}),
         "reporting": params.values(reporting),

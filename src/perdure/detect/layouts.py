@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.detect.letterbox import CORNER, MIDDLE, STRETCHED, Fit
+from perdure.detect.letterbox import CORNER, STRETCHED, Fit
 from perdure.errors import FormatError
 
 Float = NDArray[np.float32]
@@ -148,11 +148,13 @@ def _of_several(
         places = _by_shape(shapes, [np.asarray(one).dtype for one in answer])
     if -1 in places or shapes[places[0]][-1:] != (4,):
         return None
-    decode = partial(_apart, places=tuple(places), size=size, rows_first=plain[places[0]].startswith("detection_"))
-    if plain[places[0]] == "bboxes":  # of the ONNX model zoo
+    boxes, scores, labels = places
+    rows_first = plain[boxes].startswith("detection_")  # TensorFlow's
+    decode = partial(_apart, places=(boxes, scores, labels), size=size, rows_first=rows_first)
+    if plain[boxes] == "bboxes":  # of the ONNX model zoo
         fit = Fit(*size, STRETCHED, mean=(0.485, 0.456, 0.406), spread=(0.229, 0.224, 0.225))
     else:
-        fit = Fit(*size, STRETCHED if decode.keywords["rows_first"] else CORNER)
+        fit = Fit(*size, STRETCHED if rows_first else CORNER)
     return Layout("boxes, scores and labels", fit, decode, suppressed=True)
 
 

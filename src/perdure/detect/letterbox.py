@@ -50,11 +50,11 @@ class Fit:
             part = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
         whole = np.full((self.height, self.width, 3), GREY, np.uint8)
         whole[top : top + height, left : left + width] = part[..., ::-1] if self.bgr else part
-        values = whole.astype(np.float32)
+        values: Float = whole.astype(np.float32)
         if self.most != 255.0:
             values *= np.float32(self.most / 255.0)
         if self.mean != (0.0, 0.0, 0.0) or self.spread != (1.0, 1.0, 1.0):
-            values = (values - np.float32(self.mean)) / np.float32(self.spread)
+            values = np.asarray((values - self.mean) / self.spread, np.float32)
         return values
 
     def back(self, boxes: Boxes, height: int, width: int) -> Boxes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -69,10 +70,11 @@ def told(frame: int, reasons: Reasons) -> tuple[Event, ...]:
     return (Event(KIND, frame, frame, why=f"{sum(reasons.values())} boxes left out: {words}"),)
 
 
-class LeftOut(NamedTuple):
+@dataclass(frozen=True)
+class LeftOut:
     """What was left out so far: how many boxes, and the first event that tells of it."""
 
-    count: int = 0
+    boxes: int = 0
     first: Event | None = None
 
     @property
@@ -81,12 +83,12 @@ class LeftOut(NamedTuple):
         if self.first is None:
             return ()
         first = f"in frame {self.first.begin}, {self.first.why}"
-        return (f"{self.count} boxes that the detector gave were left out; first, {first}",)
+        return (f"{self.boxes} boxes that the detector gave were left out; first, {first}",)
 
 
-def left_out(events: Iterable[Event], before: LeftOut = LeftOut()) -> LeftOut:
+def left_out(events: Iterable[Event], before: LeftOut | None = None) -> LeftOut:
     """Return what was left out before and by events that tell of it."""
-    count, first = before
+    count, first = (before.boxes, before.first) if before is not None else (0, None)
     for event in events:
         if event.kind == KIND:
             count, first = count + int(event.why.split()[0]), first or event

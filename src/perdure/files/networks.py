@@ -188,21 +188,19 @@ def _runner(
 
 def _open_onnx(place: Path, threads: int) -> _Opened:
     session = open_session(place, threads)
-    ports = [
-        tuple(Port(one.name, _shape(one.shape), _ONNX_KINDS.get(one.type, one.type)) for one in many)
-        for many in (session.get_inputs(), session.get_outputs())
-    ]
+    inputs, outputs = (tuple(map(_onnx_port, many)) for many in (session.get_inputs(), session.get_outputs()))
     metadata = session.get_modelmeta().custom_metadata_map
 
     def run(given: NDArray[Any]) -> Sequence[NDArray[Any]]:
-        answer: Sequence[NDArray[Any]] = session.run(None, {ports[0][0].name: given})
+        answer: Sequence[NDArray[Any]] = session.run(None, {inputs[0].name: given})
         return answer
 
-    return _Opened(*ports, metadata, run)
+    return _Opened(inputs, outputs, metadata, run)
 
 
-def _shape(declared: Sequence[Any]) -> tuple[int | None, ...]:
-    return tuple(one if isinstance(one, int) and one >= 0 else None for one in declared)
+def _onnx_port(one: Any) -> Port:
+    shape = tuple(side if isinstance(side, int) and side >= 0 else None for side in one.shape)
+    return Port(one.name, shape, _ONNX_KINDS.get(one.type, one.type))
 
 
 _ONNX_KINDS = {"tensor(float)": "float32", "tensor(float16)": "float16", "tensor(uint8)": "uint8"}
@@ -227,14 +225,14 @@ def _open_openvino(place: Path, threads: int) -> _Opened:
         raise FormatError(
             f"{place}: not a whole model of OpenVINO, or not one that it can run ({_short(error)})"
         ) from None
-    ports = [tuple(map(_openvino_port, many)) for many in (compiled.inputs, compiled.outputs)]
+    inputs, outputs = (tuple(map(_openvino_port, many)) for many in (compiled.inputs, compiled.outputs))
     request = compiled.create_infer_request()
 
     def run(given: NDArray[Any]) -> Sequence[NDArray[Any]]:
         answer = request.infer({0: given})
         return [np.array(answer[one]) for one in compiled.outputs]
 
-    return _Opened(*ports, _openvino_metadata(model), run)
+    return _Opened(inputs, outputs, _openvino_metadata(model), run)
 
 
 def _openvino_port(one: Any) -> Port:
