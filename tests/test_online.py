@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import supervision
 
 import perdure
-from perdure.errors import ParameterError
+from perdure.errors import ParameterError, PerdureError
 from perdure.types import Regions
 
 BOXES = np.float32([[100, 10, 120, 40], [10, 10, 30, 40]])
@@ -44,6 +46,44 @@ def test_masks_of_supervision_are_kept_as_silhouettes():
     tracker = perdure.Online("overlap", fps=10, confirm=0.0)
     tracker.update(supervision.Detections(xyxy=BOXES, mask=bits))
     assert sorted(mask.box for mask in tracker.report.rows.masks) == [(11, 12, 20, 30), (101, 12, 110, 30)]
+
+
+def test_supervision_goes_to_regions_and_back_with_order_masks_classes_ids_and_data_kept():
+    bits = np.zeros((2, 60, 160), bool)
+    bits[0, 12:30, 101:110] = bits[1, 12:30, 11:20] = True
+    given = supervision.Detections(
+        xyxy=BOXES,
+        mask=bits,
+        confidence=np.float32([0.9, 0.8]),
+        class_id=np.array([2, 0]),
+        tracker_id=np.array([9, 4]),
+        data={"class_name": np.array(["car", "person"]), "speed": np.array([[3.0, 1.0], [4.0, 2.0]])},
+    )
+    again = perdure.to_supervision(perdure.to_regions(given), size=(60, 160))
+    assert again == given
+    assert again.mask.dtype == bool
+    assert perdure.to_supervision(perdure.to_regions(given)).mask is None
+    assert perdure.to_supervision(perdure.to_regions(given), names=["person", "bus"]).class_id.tolist() == [-1, 0]
+
+
+def test_tracks_go_to_supervision_with_ids_silhouettes_and_classes():
+    bits = np.zeros((2, 60, 160), bool)
+    bits[0, 12:30, 101:110] = True
+    tracker = perdure.Online("overlap", fps=10, confirm=0.0)
+    tracker.update(supervision.Detections(xyxy=BOXES, mask=bits, class_id=np.array([2, 0])))
+    rows = tracker.report.rows
+    out = perdure.to_supervision(rows, size=(60, 160))
+    assert out.tracker_id.tolist() == rows.ids.tolist()
+    assert out.class_id.tolist() == [int(name) for name in rows.classes]
+    assert out.data["class_name"].tolist() == rows.classes.tolist()
+    assert sorted(int(one.sum()) for one in out.mask) == [0, 162]
+    assert len(perdure.to_supervision(perdure.Tracks.empty())) == 0
+
+
+def test_without_supervision_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "supervision", None)
+    with pytest.raises(PerdureError, match=r"perdure\[supervision\]"):
+        perdure.to_supervision(Regions.empty())
 
 
 def test_no_detections_are_a_value():

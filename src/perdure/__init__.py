@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from perdure.pipeline import follow, plan, track
     from perdure.states import load, save
     from perdure.types import Event, Frame, Mask, Outline, Regions, Report, Scene, Status, Tracks
+    from perdure.types.detections import to_regions, to_supervision
 
 _HOME = {
     "perdure.errors": [
@@ -44,6 +45,7 @@ _HOME = {
     "perdure.online": ["Online"],
     "perdure.pipeline": ["follow", "plan", "track"],
     "perdure.states": ["load", "save"],
+    "perdure.types.detections": ["to_regions", "to_supervision"],
     "perdure.types": ["Event", "Frame", "Mask", "Outline", "Regions", "Report", "Scene", "Status", "Tracks"],
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
@@ -74,6 +76,8 @@ __all__ = [
     "plan",
     "save",
     "settle",
+    "to_regions",
+    "to_supervision",
     "track",
 ]
 

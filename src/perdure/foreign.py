@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Mapping
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from perdure.errors import ParameterError
+from perdure.files.settings import read_settings
 from perdure.trackers.foreign import LIBRARIES, Foreign
 
 ENVIRONMENT = "PERDURE_PEERS"  # variable that names one, where the user names none
@@ -56,24 +56,7 @@ def about(tracker: object) -> dict[str, Any]:
 
 def _settings(given: AnySettings) -> dict[str, Any]:
     """The arguments by name."""
-    if isinstance(given, Mapping):
-        return dict(given)
-    text, what = str(given), "--tracker-settings"
-    if not text.lstrip().startswith("{"):
-        what = str(given)
-        try:
-            text = Path(given).read_text(encoding="utf-8-sig")
-        except (OSError, ValueError) as error:
-            raise ParameterError(
-                f"cannot read {given}: {getattr(error, 'strerror', None) or 'it is no text'}"
-            ) from error
-    try:
-        value = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ParameterError(f"{what} is not JSON: {error}") from error
-    if not isinstance(value, dict):
-        raise ParameterError(f'{what}: wanted is a JSON object such as {{"lost_track_buffer": 60}}')
-    return value
+    return dict(given) if isinstance(given, Mapping) else read_settings(given, "--tracker-settings")
 
 
 def _interpreter(environment: str | Path | None) -> str:

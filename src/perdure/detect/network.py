@@ -94,12 +94,12 @@ class Network:
         if frame.image is None or self.model is None:
             return state, Regions.empty()
         height, width = frame.image.shape[:2]
-        fit = self.model.layout.fit
-        found = self.model.layout.decode(self.model.run(fit.fitted(frame.image)))
+        layout, fit = self.model.layout, self.model.layout.fit
+        found = layout.decode(self.model.run(fit.fitted(frame.image)))
         found = _taken(
             found, np.flatnonzero(~(found.scores < self.network_score))
         )  # what is no number stays, to be told
-        sifted = plausible(found.boxes, found.scores, _CANDIDATES)
+        sifted = plausible(found.boxes, found.scores, self.most_objects if layout.suppressed else _CANDIDATES)
         found = _taken(found, sifted.rows)
         boxes = fit.back(found.boxes, height, width)
         boxes = np.clip(boxes, 0, np.array([width, height, width, height], np.float32))

@@ -105,7 +105,9 @@ def with_fps(arguments: dict[str, Any], fps: float) -> dict[str, Any]:
 
 LIBRARIES = {"trackers": trackers_peer, "pyxtrackers": pyxtrackers_peer, "norfair": norfair_peer}
 DISTRIBUTIONS = {"norfair": ("norfair-enough", "norfair")}  # where it is not the library's own name
-USUAL: dict[str, dict[str, Any]] = {  # arguments where the user gives none, by library; bench/peers/settings.toml has the same as defaults
+USUAL: dict[
+    str, dict[str, Any]
+] = {  # arguments where the user gives none, by library; bench/peers/settings.toml has the same as defaults
     "trackers": {"frame_rate": "fps"},
     "norfair": {"distance_function": "iou", "distance_threshold": 0.7},
 }
