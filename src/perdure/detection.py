@@ -153,7 +153,12 @@ def about(detector: Any, name: str) -> dict[str, Any]:
 def check_classes(detector: Any, classes: Sequence[str]) -> None:
     """Refuse a wanted class that the detector cannot tell of, where it is known which it can."""
     known = getattr(inner(detector), "class_names", ())
+    numbers = getattr(inner(detector), "model", None) is not None and not known
     for name in classes:
+        if numbers and not name.isdecimal():
+            raise ParameterError(
+                f"the network does not name its classes, so that {name!r} is none; give --class-names FILE, or its number"
+            )
         if known and name not in known:
             raise ParameterError(params.unknown_name("class of the network", name, known))
 

@@ -238,6 +238,8 @@ def test_a_model_of_openvino_that_is_not_whole_is_refused(tmp_path):
         read_network("openvino", place)
     with pytest.raises(FormatError, match=r"is a folder; name the \.xml file"):
         read_network("openvino", tmp_path)
+    with pytest.raises(FormatError, match=r"reads an \.xml file"):
+        read_network("openvino", tmp_path / "m.bin")
 
 
 def test_openvino_sees_what_onnxruntime_sees(tmp_path):
@@ -262,6 +264,17 @@ def test_a_class_that_the_network_does_not_have_is_refused_with_the_nearest(tmp_
     assert all(
         len(regions) == 0 for _, regions in perdure.plan(film, detector=f"onnx:{place}", classes="car").seen()
     )
+
+
+def test_of_a_network_that_names_no_classes_only_numbers_can_be_wanted(tmp_path):
+    film = [np.full((64, 64, 3), 255, np.uint8)]
+    place = red_meter(tmp_path / "m.onnx", [0, 1, 0, 0.25, 0.25, 0.5, 0.5], at=2, most=255.0, shape=(1, 3, 64, 64))
+    with pytest.raises(ParameterError, match="'person' is none; give --class-names FILE"):
+        perdure.plan(film, detector=f"onnx:{place}", classes="person")
+    by_number = perdure.plan(film, detector=f"onnx:{place}", classes="1")
+    by_name = perdure.plan(film, detector=f"onnx:{place}", classes="person", class_names=["floor", "person"])
+    for made, said in ((by_number, "1"), (by_name, "person")):
+        assert [regions.classes.tolist() for _, regions in made.seen()] == [[said]]
 
 
 @pytest.mark.parametrize(

@@ -212,6 +212,10 @@ def _open_openvino(place: Path, threads: int) -> _Opened:
     except ImportError:
         raise ParameterError(f"the model {place} needs OpenVINO; pip install 'perdure[openvino]'") from None
     check_model_file(place, ".xml")
+    if place.suffix.lower() not in (".xml", ".onnx"):
+        raise FormatError(
+            f"{place}: OpenVINO reads an .xml file, with its weights in .bin beside it, or an .onnx file"
+        )
     if place.suffix.lower() == ".xml" and not place.with_suffix(".bin").is_file():
         raise FormatError(
             f"{place}: its weights {place.with_suffix('.bin').name} are not beside it; put them there"
