@@ -50,7 +50,9 @@ def test_a_network_is_tracked_by_class_and_the_run_tells_what_it_was(at: Path):
     )
     rows = read_tracks(at / "wolves" / "tracks.txt")
     assert set(rows.ids.tolist()) == {1}
-    assert rows.boxes[0].tolist() == pytest.approx([72, 11.16, 96, 70.7], abs=0.01)  # 43 rows of 64 are the picture
+    assert rows.boxes[0].tolist() == pytest.approx(
+        [72, 11.16, 96, 70.7], abs=0.01
+    )  # 43 rows of 64 are the picture
     told = json.loads((at / "wolves" / "run.json").read_text())["detector"]
     assert told["name"] == "onnx"
     assert told["network"] == {

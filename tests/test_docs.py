@@ -39,7 +39,12 @@ def test_every_option_that_the_documents_name_exists():
     declared |= {f"no-{one.name.replace('_', '-')}" for one in parameters if one.kind is bool}
     programs = [*(ROOT / "src/perdure/cli").glob("*.py"), *(ROOT / "bench").glob("*.py")]
     source = "".join(path.read_text(encoding="utf-8") for path in programs)
-    elsewhere = {"help", "check", "report-confidence"}  # ours, ruff's, and one read off its declaration
+    elsewhere = {
+        "help",
+        "check",
+        "report-confidence",
+        "no-deps",
+    }  # ours, ruff's, one read off its declaration, pip's
     assert {one for one in named if one not in declared | elsewhere and f'"--{one}"' not in source} - {
         "tracker"
     } == set()
