@@ -61,8 +61,8 @@ def read_network(
     place = Path(path)
     opened = (_open_onnx if engine == "onnx" else _open_openvino)(place, threads)
     port = _picture_port(place, opened)
-    first = port.shape[1] in (1, 3)  # channels before rows
-    shape = _size_of(place, port.shape[2:] if first else port.shape[1:3], size, opened.metadata)
+    first = port.shape[-3] == 3  # channels before rows
+    shape = _size_of(place, port.shape[-2:] if first else port.shape[-3:-1], size, opened.metadata)
     run = _runner(opened.run, port, first)
     grey = np.full((*shape, 3), GREY / 255.0 if port.kind != "uint8" else GREY, np.float32)
     try:
@@ -138,7 +138,7 @@ def _picture_port(place: Path, opened: _Opened) -> Port:
     port = opened.inputs[0]
     if port.kind not in _KINDS:
         raise FormatError(f"{place}: its input {there} takes {port.kind}; known are {', '.join(_KINDS)}")
-    if len(port.shape) != 4 or (port.shape[1] != 3 and port.shape[3] != 3):
+    if len(port.shape) not in (3, 4) or 3 not in (port.shape[-3], port.shape[-1]):
         raise FormatError(f"{place}: its input {there} is not (N, 3, H, W) or (N, H, W, 3), a picture in colour")
     return port
 
@@ -177,11 +177,11 @@ def _runner(
     run: Callable[[NDArray[Any]], Sequence[NDArray[Any]]], port: Port, first: bool
 ) -> Callable[[NDArray[np.float32]], Sequence[NDArray[Any]]]:
     """What runs a network on one picture (H, W, 3); one that is made for several gets the same several times."""
-    count = port.shape[0] or 1
+    several = (port.shape[0] or 1,) if len(port.shape) == 4 else ()  # torchvision's may take one picture as it is
 
     def run_one(picture: NDArray[np.float32]) -> Sequence[NDArray[Any]]:
         given = picture.transpose(2, 0, 1) if first else picture
-        return run(np.ascontiguousarray(np.broadcast_to(given, (count, *given.shape)), np.dtype(port.kind)))
+        return run(np.ascontiguousarray(np.broadcast_to(given, (*several, *given.shape)), np.dtype(port.kind)))
 
     return run_one
 
