@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.detect.layouts import Found, Layout
+from perdure.detect.letterbox import Fit
 from perdure.detect.plausible import MOST, MOST_HELP, centred_in, plausible, surest, told
 from perdure.detect.suppression import one_each
 from perdure.errors import ParameterError
@@ -93,20 +94,16 @@ class Network:
         """Return what the network sees in one picture, and an event for boxes that cannot be."""
         if frame.image is None or self.model is None:
             return state, Regions.empty()
-        height, width = frame.image.shape[:2]
-        layout, fit = self.model.layout, self.model.layout.fit
-        found = layout.decode(self.model.run(fit.fitted(frame.image)))
+        layout = self.model.layout
+        found = layout.decode(self.model.run(layout.fit.fitted(frame.image)))
         found = _taken(
             found, np.flatnonzero(~(found.scores < self.network_score))
         )  # what is no number stays, to be told
         sifted = plausible(found.boxes, found.scores, self.most_objects if layout.suppressed else _CANDIDATES)
-        found = _taken(found, sifted.rows)
-        boxes = fit.back(found.boxes, height, width)
-        boxes = np.clip(boxes, 0, np.array([width, height, width, height], np.float32))
-        found = _taken(found._replace(boxes=boxes), np.flatnonzero((boxes[:, 2:] > boxes[:, :2]).all(axis=1)))
+        found = _in_picture(_taken(found, sifted.rows), layout.fit, *frame.image.shape[:2])
         found = _taken(found, self._one_each(found))
-        kept = surest(np.arange(len(found.boxes)), found.scores, self.most_objects)
         reasons = dict(sifted.reasons)
+        kept = surest(np.arange(len(found.boxes)), found.scores, self.most_objects)
         if len(kept) < len(found.boxes):
             reasons[f"after the surest {self.most_objects}"] = len(found.boxes) - len(kept)
         found = _taken(found, kept)
@@ -126,6 +123,13 @@ class Network:
 
 
 _CANDIDATES = 3000  # boxes in a picture that are compared with one another
+
+
+def _in_picture(found: Found, fit: Fit, height: int, width: int) -> Found:
+    """What is found, in pixels of the picture (height, width), cut to it; what lies outside is left out."""
+    boxes = np.clip(fit.back(found.boxes, height, width), 0, np.array([width, height, width, height], np.float32))
+    inside = np.flatnonzero((boxes[:, 2:] > boxes[:, :2]).all(axis=1))
+    return _taken(found._replace(boxes=boxes), inside)
 
 
 def _taken(found: Found, rows: NDArray[np.intp]) -> Found:
