@@ -374,8 +374,8 @@ def track(source: AnySource, **options: Any) -> Tracks:
     source : str, Path, int or iterable of (H, W, 3) uint8 arrays
         A video, an image folder or glob, a MOTChallenge folder, a camera number, a URL, or pictures.
     options
-        Those of `plan`: tracker, tracker_settings, tracker_environment, detector, box_masks, class_names, init, fps, start, end, stride, roi, zones, calibration, object_height,
-        classes, context, embedding, scenarios; and parameters of the detector and the tracker by name.
+        Those of `plan`: tracker, tracker_settings, tracker_environment, detector, box_masks, class_names, init, fps,
+        start, end, stride, roi, zones, calibration, object_height, classes, context, embedding, scenarios; and parameters of the detector and the tracker by name.
 
     Raises
     ------
