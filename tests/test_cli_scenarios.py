@@ -11,8 +11,10 @@ from typer.testing import CliRunner
 
 import perdure
 from perdure.cli.commands import app
+from perdure.cli.film import Doings
 from perdure.errors import ParameterError
 from perdure.interpret import Feedback
+from perdure.types import Event
 
 OWN = """
 [[scenario]]
@@ -134,3 +136,17 @@ def test_a_zone_that_is_not_there_is_refused_before_the_first_frame(yard: Path, 
     assert code
     assert "there is no zone 'gate'" in wrong
     assert not (tmp_path / "run").exists()
+
+
+def test_the_film_says_what_everybody_does_while_it_lasts():
+    doings = Doings.of(
+        [Event("runs", 5, 20, (1,)), Event("takes_away", 8, 8, (1, 2)), Event("runs", 18, 30, (1,))], fps=10
+    )
+    told = {k: doings.at(k) for k in range(40)}
+    assert told[4] == {}
+    assert told[5] == {1: "runs"}
+    assert told[10] == {1: "runs, takes away", 2: "takes away"}
+    assert told[18] == {1: "runs, takes away", 2: "takes away"}
+    assert told[21] == {1: "runs"}
+    assert told[30] == {1: "runs"}
+    assert told[31] == {}

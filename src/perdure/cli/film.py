@@ -12,7 +12,7 @@ from perdure.files.film import Film
 from perdure.files.runs import RunFolder
 from perdure.files.video import Source
 from perdure.fold import Step
-from perdure.types import Scene, Tracks
+from perdure.types import Event, Scene, Tracks
 
 
 def draw_film(
@@ -29,6 +29,7 @@ def draw_film(
     by frame, where they are to be shown.
     """
     rows_of = _Rows(folder.settled_by_frame())
+    doings = Doings.of(folder.scenario_events(), scene.fps)
     frames = 0
     trails = Trails.empty()
     with Film(path or folder.film, scene.width, scene.height, fps=scene.fps) as film:
@@ -37,7 +38,7 @@ def draw_film(
                 rows = rows_of.at(frame.index)
                 trails = trails.extended(rows, frame.time)
                 here = None if marks is None else marks.get(frame.index, ())
-                film.write(paint(frame, rows, trails, scene, marks=here), frame.time)
+                film.write(paint(frame, rows, trails, scene, marks=here, words=doings.at(frame.index)), frame.time)
                 frames += 1
                 if count is not None and frames >= count:
                     break
@@ -56,6 +57,38 @@ def drawn_while_running(steps: Iterable[Step], scene: Scene, path: Path) -> Iter
                 trails = trails.extended(rows, step.frame.time)
                 film.write(paint(step.frame, rows, trails, scene), step.frame.time)
             yield step
+
+
+class Doings:
+    """What targets do, by scenarios, to be written behind their ids: while it lasts, and for a second after a moment."""
+
+    def __init__(self, spans: Sequence[tuple[int, int, int, str]]) -> None:
+        self._spans = sorted(spans)  # begin, end, id, word
+        self._next = 0
+        self._now: list[tuple[int, int, int, str]] = []
+
+    @staticmethod
+    def of(events: Sequence[Event], fps: float) -> Doings:
+        """Return the doings that events tell of."""
+        return Doings(
+            [
+                (one.begin, max(one.end, one.begin + round(fps)), identity, one.kind.replace("_", " "))
+                for one in events
+                for identity in one.ids
+            ]
+        )
+
+    def at(self, frame: int) -> dict[int, str]:
+        """Return what is written in a frame, by id; frames are asked for in order."""
+        while self._next < len(self._spans) and self._spans[self._next][0] <= frame:
+            self._now.append(self._spans[self._next])
+            self._next += 1
+        self._now = [one for one in self._now if one[1] >= frame]
+        words: dict[int, list[str]] = {}
+        for _, _, identity, word in self._now:
+            if word not in (known := words.setdefault(identity, [])):
+                known.append(word)
+        return {identity: ", ".join(some) for identity, some in words.items()}
 
 
 class _Rows:

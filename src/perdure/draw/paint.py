@@ -19,7 +19,7 @@ letters grow with the picture's height. Nothing here opens a file, and the same 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -47,6 +47,7 @@ def paint(
     *,
     masks: bool = True,
     marks: Sequence[Mark] | None = None,
+    words: Mapping[int, str] | None = None,
 ) -> Image:
     """Return a new picture of the frame with its rows drawn in.
 
@@ -64,6 +65,8 @@ def paint(
         Whether silhouettes are drawn too.
     marks : sequence of Mark, or None
         What departs from a truth in this frame, and a line that says what the marks mean; None for neither.
+    words : mapping of int to str, or None
+        What is written behind ids: what they are doing.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def paint(
     height, width = picture.shape[:2]
     style = Style.of(height)
     seen = rows.take(_inside(rows, height, width))
-    looks = _looks(seen, style)
+    looks = _looks(seen, style, words or {})
     silhouettes = _silhouettes(seen, looks, style, height, width) if masks else []
     dashed = _believed_contours(seen, looks, style, height, width) if masks else []
     names = draw_zones(picture, scene, style) if scene.zones else ()
@@ -121,7 +124,7 @@ def _inside(rows: Tracks, height: int, width: int) -> NDArray[np.bool_]:
     return np.asarray((x1 < width) & (y1 < height) & (x2 > 0) & (y2 > 0))
 
 
-def _looks(rows: Tracks, style: Style) -> list[_Look]:
+def _looks(rows: Tracks, style: Style, words: Mapping[int, str]) -> list[_Look]:
     is_group = rows.is_group
     looks = []
     for i, identity in enumerate(rows.ids.tolist()):
@@ -133,6 +136,7 @@ def _looks(rows: Tracks, style: Style) -> list[_Look]:
         place = rows.ground[i]
         if place is not None and place.speed is not None and not is_group[i]:
             text += f" {place.speed:.1f} m/s"
+        text = " ".join(filter(None, (text, words.get(identity, ""))))
         dim = status in (Status.OCCLUDED, Status.LOST)
         dashes = _dashes(status, str(rows.hidden_side[i]), style)
         looks.append(_Look(dimmer(colour) if dim else colour, text, dashes, not dim, bool(is_group[i])))

@@ -186,6 +186,16 @@ class RunFolder:
         events = tuple(coherent(kept, set(rows.ids.tolist())))
         return rows, events, sum(entry.frame >= 0 for entry in entries)
 
+    def scenario_events(self) -> tuple[Event, ...]:
+        """Return the settled events of scenarios that the run was to recognise; none where it was to recognise none."""
+        about = self.read_about().get("scenarios")
+        wanted = about.get("scenarios", ()) if isinstance(about, dict) else ()
+        names = {one.get("name") for one in wanted if isinstance(one, dict)}
+        if not names:
+            return ()
+        _, events, _ = self.read(with_masks=False)
+        return tuple(one for one in events if one.kind in names)
+
     def write_results(self, reporting: Reporting) -> Totals:
         """Settle the log into `tracks.txt` and `events.csv`, streaming."""
         corrections = Corrections.of(entry.report for entry in read_log(self.log, with_masks=False))
