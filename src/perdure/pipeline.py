@@ -22,6 +22,7 @@ from perdure.detection import AnyDetector, check_classes, detector_name, kinds_o
 from perdure.equipment import AnyContext, equipped
 from perdure.errors import DamagedVideo, ParameterError
 from perdure.files.calibration import read_calibration
+from perdure.files.live_source import LiveSource
 from perdure.files.marks import AnyMark, read_marks, words_of
 from perdure.files.roi import read_roi
 from perdure.files.scenarios import read_rules
@@ -44,7 +45,7 @@ LOOKED = 120.0  # s of a film in which people tell of the ground
 AUTO = "auto"
 FIRST_LOOKS = 25  # frames spread over a file that a detector may see first
 
-AnySource = str | Path | int | Iterable[NDArray[np.uint8]]
+AnySource = str | Path | int | Iterable[NDArray[np.uint8]] | LiveSource
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from perdure.cli.explain import explain
 from perdure.cli.export import export
 from perdure.cli.learn import LearnCommand, learn
 from perdure.cli.learn_zones import learn as learn_zones
+from perdure.cli.live import live
 from perdure.cli.scenarios import scenarios
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
@@ -52,7 +53,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, detect, draw, export, count, calibrate, context, explain, scenarios, demo, warmup):
+for command in (track, live, detect, draw, export, count, calibrate, context, explain, scenarios, demo, warmup):
     app.command()(_interruptible(command))
 app.command(cls=LearnCommand)(_interruptible(learn))
 app.command("learn-zones")(_interruptible(learn_zones))

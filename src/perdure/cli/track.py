@@ -26,7 +26,7 @@ from perdure.detection import file_of
 from perdure.equipment import chosen_by
 from perdure.errors import OutputError, ParameterError
 from perdure.files.calibration import value_of
-from perdure.files.live_events import LiveEvents
+from perdure.files.live_events import LiveEvents, lines_to
 from perdure.files.log import RunLog
 from perdure.files.runs import Reporting, RunFolder, Totals
 from perdure.files.scenarios import rules_to_json
@@ -151,7 +151,7 @@ def track(
         window["zones"] = str(zones)
     if calibration is not None:
         window |= {"calibration": calibration, "object_height": object_height}
-    live = LiveEvents(sys.stdout) if events else None
+    live = LiveEvents(lines_to(sys.stdout)) if events else None
     outcome = run(made, folder, reporting, window=window, film=not no_video, live=live)
     with contextlib.redirect_stdout(sys.stderr) if events else contextlib.nullcontext():
         show(outcome, folder, as_json=json_)
@@ -193,7 +193,7 @@ def run(
     live: LiveEvents | None = None,
 ) -> Outcome:
     """Run a plan into a folder: log, results, film; whatever happens, what was tracked so far is kept."""
-    about = _about(made, reporting, window or {})
+    about = about_run(made, reporting, window or {})
     folder.write_about({**about, "status": "running"})
     counted = _Count()
     try:
@@ -305,7 +305,8 @@ class _Count:
         return self._last
 
 
-def _about(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str, Any]:
+def about_run(made: Plan, reporting: Reporting, window: dict[str, Any]) -> dict[str, Any]:
+    """Return what `run.json` says of a run before it has begun."""
     source = made.source
     return {
         "source": str(source.origin),

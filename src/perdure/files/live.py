@@ -27,12 +27,12 @@ _RATE = 25.0
 _NO_SEEKING = "; if it is an mp4, its index may be at its end: download it first"
 
 
-def open_url(url: str, fps: float | None, span: Span) -> Passing:
-    """Open a stream by its URL (RTSP over TCP, HTTP, RTMP, UDP, …)."""
+def open_url(url: str, fps: float | None, span: Span, silence: float = _PATIENCE) -> Passing:
+    """Open a stream by its URL (RTSP over TCP, HTTP, RTMP, UDP, …); it may be silent for `silence` seconds."""
     shown = _without_password(url)
     options = {"rtsp_transport": "tcp"} if url.lower().startswith("rtsp") else {}
     try:
-        container = av.open(url, options=options, timeout=_PATIENCE, **TOLERANT)
+        container = av.open(url, options=options, timeout=(_PATIENCE, silence), **TOLERANT)
     except (av.error.FFmpegError, OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise VideoError(f"{shown} cannot be reached ({why}); check the address and the network") from None

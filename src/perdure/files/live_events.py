@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import IO
+from collections.abc import Callable
+from typing import IO, Any
 
 from perdure.fold import Step
 from perdure.types import Event
 
 
 class LiveEvents:
-    """Writes the events of a run while it goes on.
+    """Hands out the events of a run while it goes on, as plain values.
 
     A scenario that lasts is told twice: `"state": "begins"` when it is recognised, `"ends"` when it is over; what happens
     in a moment, and what a tracker tells, once, as `"state": "happens"`. Ids are those of the moment: who turns out later
     to be another is told in the run folder's `events.csv` alone.
     """
 
-    def __init__(self, out: IO[str]) -> None:
+    def __init__(self, out: Callable[[dict[str, Any]], None]) -> None:
         self._out = out
         self._lasting: set[tuple[str, tuple[int, ...], str]] = set()
         self._time = 0.0
@@ -46,5 +47,14 @@ class LiveEvents:
             "confidence": event.confidence,
             "why": event.why,
         }
-        self._out.write(json.dumps(value, ensure_ascii=False) + "\n")
-        self._out.flush()
+        self._out(value)
+
+
+def lines_to(out: IO[str]) -> Callable[[dict[str, Any]], None]:
+    """Return what writes values as lines of JSON, each at once."""
+
+    def write(value: dict[str, Any]) -> None:
+        out.write(json.dumps(value, ensure_ascii=False) + "\n")
+        out.flush()
+
+    return write

@@ -164,3 +164,27 @@ def _read_moment(text: str) -> Moment | None:
 def _whole(digits: str) -> int:
     """A whole number; one of very many digits only as large as shows that it is out of range."""
     return int(digits) if len(digits) <= 18 else 10**18
+
+
+def seconds_of(given: str, name: str) -> float:
+    """Return how many seconds a length of time is, as a user writes it: '90', '1:30', '0:01:30', '90s', '15m', '1h'.
+
+    Raises
+    ------
+    ParameterError
+        For what is no such time.
+
+    >>> seconds_of("1:30", "for"), seconds_of("2h", "roll")
+    (90.0, 7200.0)
+    """
+    unit = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}.get(given[-1:])
+    clock = _CLOCK.fullmatch(given if unit is None else given[:-1])
+    if clock is None or (unit is not None and ":" in given):
+        raise ParameterError(
+            f"{name} = {shown(given)} is no length of time; write '90s', '15m', '1h' or '1:30:00'"
+        )
+    hours, minutes, seconds = (float(part or 0) for part in clock.groups())
+    total = (3600 * hours + 60 * minutes + seconds) * (unit or 1.0)
+    if total > _LONGEST:
+        raise ParameterError(f"{name} = {shown(given)} is longer than can be")
+    return total

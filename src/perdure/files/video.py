@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import ParameterError, VideoError
+from perdure.files.live_source import LiveSource
 from perdure.files.span import Span, cut, read_span, real, shown
 from perdure.types import Bits, Frame, Scene
 
@@ -104,7 +105,7 @@ class Source(Protocol):
 
 
 def open_source(
-    source: str | Path | int | Iterable[NDArray[np.uint8]],
+    source: str | Path | int | Iterable[NDArray[np.uint8]] | LiveSource,
     *,
     fps: float | None = None,
     start: str | float | None = None,
@@ -136,6 +137,8 @@ def open_source(
     """
     rate = _rate(fps)
     span = read_span(start, end, stride)
+    if isinstance(source, LiveSource):
+        return source
     if isinstance(source, bool):
         raise ParameterError(f"{shown(source)} is no source: give a file, a folder, a URL or a camera number")
     if isinstance(source, (int, np.integer)):
