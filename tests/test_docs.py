@@ -9,6 +9,7 @@ import pytest
 
 from perdure import params
 from perdure.detect import DETECTORS
+from perdure.files.live_source import Patience
 from perdure.interpret import Feedback
 from perdure.learn import Learning
 from perdure.trackers import TRACKERS
@@ -32,7 +33,7 @@ def test_every_option_that_the_documents_name_exists():
     }
     parameters = [
         one
-        for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning, Feedback)
+        for kind in (*TRACKERS.values(), *DETECTORS.values(), Learning, Feedback, Patience)
         for one in params.describe(kind)
     ]
     declared = {one.name.replace("_", "-") for one in parameters}
