@@ -9,11 +9,10 @@ from perdure.features.masks import (
     mask_overlaps,
     mask_shares,
     of_picture_runs,
-    of_run_lengths,
     picture_runs,
-    run_lengths,
 )
 from perdure.types import Mask
+from perdure.types.frame import of_run_lengths, run_lengths
 
 
 def drawn(picture: str, y: int = 0, x: int = 0) -> Mask:

@@ -249,7 +249,7 @@ def _write_mots(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], beli
 
 def _write_geojson(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
     count = 0
-    write_geojson_begin(file, *_size(folder))
+    write_geojson_begin(file, _size(folder))
     for rows in frames:
         count += write_features(file, rows, believed=believed, first=not count)
     write_geojson_end(file)

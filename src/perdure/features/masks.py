@@ -53,31 +53,6 @@ def holding(boxes: Boxes, masks: Sequence[Mask]) -> Boxes:
     return np.concatenate([np.minimum(boxes[:, :2], seen[:, :2]), np.maximum(boxes[:, 2:], seen[:, 2:])], axis=1)
 
 
-def run_lengths(mask: Mask) -> list[int]:
-    """Return lengths of alternating runs of false and true, column by column, beginning with false."""
-    flat = mask.bits.ravel(order="F")
-    if not flat.size:
-        return []
-    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    runs = np.diff(np.concatenate([[0], changes, [flat.size]]))
-    return ([0] if flat[0] else []) + [int(run) for run in runs]
-
-
-def of_run_lengths(runs: Sequence[int], y: int, x: int, height: int, width: int) -> Mask:
-    """Return the mask whose `run_lengths` these are.
-
-    Raises
-    ------
-    ValueError
-        If the runs are negative or do not fill the crop.
-    """
-    counts = np.asarray(runs, np.int64)
-    if (counts < 0).any() or int(counts.sum()) != height * width:
-        raise ValueError(f"runs of {int(counts.sum())} pixels do not fill a crop of {width}x{height}")
-    flat: NDArray[np.bool_] = np.repeat(np.arange(len(counts)) % 2 == 1, counts)
-    return Mask(y, x, flat.reshape((height, width), order="F"))
-
-
 def picture_runs(mask: Mask, height: int, width: int) -> NDArray[np.int64]:
     """Return the run lengths (K,) of the whole (height, width) picture with the mask in it, without drawing it.
 

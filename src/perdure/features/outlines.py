@@ -13,6 +13,7 @@ from perdure.types import Mask, Outline
 Ring = NDArray[np.float64]  # (n, 2) x, y
 
 _NEAR = 3.0  # pixels from what is seen, within which a contour is seen
+_LARGEST = 1 << 28  # pixels of a drawing
 _SHORTEST = 12.0  # pixels of a contour, below which a piece is as those beside it
 
 
@@ -44,6 +45,40 @@ def outline_of(mask: Mask) -> Outline:
     rings = [part for ring in _followed(begins, ends) for part in _parted(ring)]
     corner = np.array([mask.x, mask.y], np.float64)
     return Outline(tuple(_corners(ring) + corner for ring in rings))
+
+
+def mask_of(outline: Outline) -> Mask:
+    """Return the pixels whose middle is inside an outline, an odd number of its lines to the left of it.
+
+    Of what `outline_of` returned, it is the mask again.
+
+    Raises
+    ------
+    ValueError
+        For an outline too large to be drawn.
+
+    >>> mask_of(Outline.of([[[5, 2], [8, 2], [8, 3], [5, 3]]])) == Mask(2, 5, np.ones((1, 3), bool))
+    True
+    """
+    if not outline.rings:
+        return Mask.empty()
+    points = np.concatenate(outline.rings)
+    left, top = np.floor(points.min(axis=0)).astype(int).tolist()
+    width, height = (np.ceil(points.max(axis=0)).astype(int) - (left, top)).tolist()
+    begins = points - (left, top)
+    ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in outline.rings]) - (left, top)
+    low, high = np.minimum(begins[:, 1], ends[:, 1]), np.maximum(begins[:, 1], ends[:, 1])
+    first, last = np.ceil(low - 0.5).astype(int), np.ceil(high - 0.5).astype(int)  # rows whose middle an edge passes
+    counts = last - first
+    if max(width * height, int(counts.sum())) > _LARGEST:
+        raise ValueError(f"an outline of {width}x{height} pixels is too large to be drawn")
+    edge = np.repeat(np.arange(len(begins)), counts)
+    rows = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+    slope = (ends[edge, 0] - begins[edge, 0]) / (ends[edge, 1] - begins[edge, 1])
+    x = begins[edge, 0] + (rows + 0.5 - begins[edge, 1]) * slope
+    crossed = np.zeros((height, width + 1), np.bool_)
+    np.logical_xor.at(crossed, (rows, np.ceil(x - 0.5).astype(int)), True)
+    return Mask.of_image(np.logical_xor.accumulate(crossed, axis=1)[:, :-1], top, left)
 
 
 def outline_of_box(box: ArrayLike) -> Outline:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.features.outlines import outline_of, outline_of_box, polygons
+from perdure.files.lines import short_row
 from perdure.types import Outline, Status, Tracks
 
 POINT_COLUMNS = ("frame", "id", "part", "ring", "point", "x", "y")
@@ -53,9 +54,10 @@ def _choices(rows: Tracks, row: int, believed: bool) -> Iterator[tuple[Outline, 
 # GeoJSON --------------------------------------------------------------------------------------------------------
 
 
-def write_geojson_begin(file: IO[str], height: int, width: int) -> None:
-    """Write what stands before the features, of pictures of this size."""
-    about = {"unit": "pixel", "x": "right", "y": "down", "height": height, "width": width}
+def write_geojson_begin(file: IO[str], size: tuple[int, int] | None) -> None:
+    """Write what stands before the features, of pictures of this height and width, where they are known."""
+    sides = {} if size is None else {"height": size[0], "width": size[1]}
+    about = {"unit": "pixel", "x": "right", "y": "down", **sides}
     file.write(f'{{"type":"FeatureCollection","picture":{_dumped(about)},"features":[')
 
 
@@ -73,6 +75,7 @@ def write_features(file: IO[str], rows: Tracks, *, believed: bool, first: bool) 
             "frame": int(rows.frames[row]),
             "time": round(float(rows.times[row]), 6),
             "id": int(rows.ids[row]),
+            "box": short_row(rows.boxes[row]),
             "class": str(rows.classes[row]),
             "group": int(rows.groups[row]),
             "status": Status(rows.status[row]).word,

@@ -142,7 +142,7 @@ def _open_images(
 
 def _open_sequence(folder: Path, fps: float | None, span: Span) -> Numbered:
     """Open a MOTChallenge folder."""
-    told = _read_seqinfo(folder / "seqinfo.ini")
+    told = read_seqinfo(folder / "seqinfo.ini")
     place = folder / told.images
     paths, warnings = _images_in(place) if place.is_dir() else ([], [])
     name, origin, rate = folder.resolve().name, str(folder.resolve()), fps or told.rate
@@ -160,7 +160,7 @@ def _no_image(_: int) -> None:
 
 
 @dataclass(frozen=True)
-class _Told:
+class Told:
     """What a seqinfo.ini says."""
 
     images: str
@@ -170,7 +170,7 @@ class _Told:
     height: int
 
 
-def _read_seqinfo(path: Path) -> _Told:
+def read_seqinfo(path: Path) -> Told:
     """Read what a seqinfo.ini says; FormatError names key, value and range."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
@@ -183,7 +183,7 @@ def _read_seqinfo(path: Path) -> _Told:
     images = told.get("imDir", "img1")
     if len(images) > 255 or not images.isprintable():
         raise FormatError(f"{path}: imDir = {cut(images)} is no name of a folder")
-    return _Told(
+    return Told(
         images,
         _number(path, told, "frameRate", float, 0.001, 1000),
         _number(path, told, "seqLength", int, 0, 10**8),

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError
-from perdure.features.masks import of_run_lengths, run_lengths
 from perdure.files.span import shown
 from perdure.types import PER_PIXEL, Mask, Outline
+from perdure.types.frame import of_run_lengths, run_lengths
 
 Json = Any
 _LONGEST_SIDE, _LARGEST_AREA = 1 << 15, 1 << 28  # px, of a silhouette

@@ -13,10 +13,14 @@ from perdure.errors import FormatError
 from perdure.files.mot_table import MotTable, read_table
 from perdure.types import Regions, Rows, Tracks, Use
 
+CLASSES = (  # of MOT16 and later, from 1
+    *("pedestrian", "person on vehicle", "car", "bicycle", "motorbike", "non-motorized vehicle", "static person"),
+    *("distractor", "occluder", "occluder on the ground", "occluder full", "reflection", "crowd"),
+)
 PROTOCOLS = ("mot15", "mot17", "mot20")
 _PEDESTRIAN = 1
 _DISTRACTORS = {"mot15": (), "mot17": (2, 7, 8, 12), "mot20": (2, 6, 7, 8, 12)}
-_LAST_CLASS = 13
+_LAST_CLASS = len(CLASSES)
 _LARGEST = 2**53  # id: beyond it floats are not exact
 
 

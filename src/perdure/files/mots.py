@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,19 @@ from perdure.features.masks import of_picture_runs, picture_runs
 from perdure.files.span import shown
 from perdure.types import Mask, Rows, Tracks, Use
 
-PERSON = 2  # the class of people in MOTS; 1 are cars
+CAR, PERSON = 1, 2  # classes of MOTS
 IGNORED_CLASS = 10  # the class of areas that are no object
+
+
+class MotsRow(NamedTuple):
+    """What a line says; the frame from 0."""
+
+    frame: int
+    id: int
+    kind: int
+    use: Use
+    size: tuple[int, int]  # height, width
+    mask: Mask
 
 
 def read_masks(path: Path) -> Rows:
@@ -34,11 +45,23 @@ def read_masks(path: Path) -> Rows:
         Naming file and line, for a line that is no such row, a size other than the first line's, and an
         object that a frame has twice.
     """
+    rows = read_lines(path)
+    return Rows.of(
+        frames=[row.frame for row in rows],
+        ids=[row.id for row in rows],
+        use=[row.use for row in rows],
+        masks=[row.mask for row in rows],
+        size=rows[0].size if rows else None,
+    )
+
+
+def read_lines(path: Path) -> list[MotsRow]:
+    """Return what the lines of a MOTS file say, in their order; refused is what `read_masks` refuses."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise FormatError(f"cannot read {path}: {getattr(error, 'strerror', None) or 'it is not text'}") from error
-    rows: list[_Row] = []
+    rows: list[MotsRow] = []
     seen: dict[tuple[int, int], int] = {}
     for number, line in enumerate(lines, 1):
         if not line.strip():
@@ -54,30 +77,30 @@ def read_masks(path: Path) -> Rows:
         except ValueError as error:
             raise FormatError(f"{path}, line {number}: {error}") from None
         rows.append(row)
-    return Rows.of(
-        frames=[row.frame for row in rows],
-        ids=[row.id for row in rows],
-        use=[row.use for row in rows],
-        masks=[row.mask for row in rows],
-        size=rows[0].size if rows else None,
-    )
+    return rows
 
 
-def write_masks(file: IO[str], rows: Tracks, height: int, width: int, class_id: int = PERSON) -> int:
+def write_masks(file: IO[str], rows: Tracks, height: int, width: int) -> int:
     """Write the silhouettes of rows as MOTS lines, and return their number; rows without one are left out.
 
-    What lies outside the (height, width) picture is cut.
+    Rows of class 'car' have class 1, all others class 2. What lies outside the (height, width) picture is cut.
     """
-    from pycocotools import mask as coco
-
     count = 0
-    for frame, identity, mask in zip(rows.frames, rows.ids, rows.masks, strict=True):
+    for frame, identity, kind, mask in zip(rows.frames, rows.ids, rows.classes, rows.masks, strict=True):
         runs = picture_runs(mask, height, width)
         if len(runs) > 1:
-            packed = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
-            file.write(f"{frame + 1} {identity} {class_id} {height} {width} {packed['counts'].decode('ascii')}\n")
+            number = CAR if kind == "car" else PERSON
+            file.write(f"{frame + 1} {identity} {number} {height} {width} {packed_runs(runs, height, width)}\n")
             count += 1
     return count
+
+
+def packed_runs(runs: NDArray[np.int64], height: int, width: int) -> str:
+    """Return the compressed rle of a picture's run lengths."""
+    from pycocotools import mask as coco
+
+    packed = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
+    return cast("str", packed["counts"].decode("ascii"))
 
 
 def unpacked_runs(text: str) -> NDArray[np.int64]:
@@ -107,17 +130,7 @@ def unpacked_runs(text: str) -> NDArray[np.int64]:
     return runs
 
 
-class _Row(NamedTuple):
-    """What a line says; the frame from 0."""
-
-    frame: int
-    id: int
-    use: Use
-    size: tuple[int, int]
-    mask: Mask
-
-
-def _row(line: str) -> _Row:
+def _row(line: str) -> MotsRow:
     """Read a line; ValueError says what is wrong with it."""
     words = line.split()
     if len(words) != 6:
@@ -131,7 +144,7 @@ def _row(line: str) -> _Row:
         raise ValueError(f"id {identity} is below 1")
     if not (1 <= height <= _LONGEST_SIDE and 1 <= width <= _LONGEST_SIDE and height * width <= _LARGEST_AREA):
         raise ValueError(f"a picture of {width}x{height} cannot be")
-    return _Row(frame - 1, identity, use, (height, width), of_picture_runs(unpacked_runs(words[5]), height, width))
+    return MotsRow(frame - 1, identity, kind, use, (height, width), of_picture_runs(unpacked_runs(words[5]), height, width))
 
 
 def _number(word: str, name: str) -> int:

@@ -1,8 +1,8 @@
-"""One picture of a source, a silhouette in it, and a contour between its pixels."""
+"""One picture of a source, a silhouette in it and its run lengths, and a contour between its pixels."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,6 +95,31 @@ class Mask:
         )
 
     __hash__ = None  # type: ignore[assignment]
+
+
+def run_lengths(mask: Mask) -> list[int]:
+    """Return lengths of alternating runs of false and true, column by column, beginning with false."""
+    flat = mask.bits.ravel(order="F")
+    if not flat.size:
+        return []
+    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    runs = np.diff(np.concatenate([[0], changes, [flat.size]]))
+    return ([0] if flat[0] else []) + [int(run) for run in runs]
+
+
+def of_run_lengths(runs: Sequence[int], y: int, x: int, height: int, width: int) -> Mask:
+    """Return the mask whose `run_lengths` these are.
+
+    Raises
+    ------
+    ValueError
+        If the runs are negative or do not fill the crop.
+    """
+    counts = np.asarray(runs, np.int64)
+    if (counts < 0).any() or int(counts.sum()) != height * width:
+        raise ValueError(f"runs of {int(counts.sum())} pixels do not fill a crop of {width}x{height}")
+    flat: NDArray[np.bool_] = np.repeat(np.arange(len(counts)) % 2 == 1, counts)
+    return Mask(y, x, flat.reshape((height, width), order="F"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from perdure.types.frame import Mask, Outline
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
 
 
 class Status(enum.IntEnum):
@@ -255,6 +256,28 @@ class Tracks:
                 "links": list(self.links),
             }
         )
+
+    def to_arrow(self) -> pyarrow.Table:
+        """Return all columns, silhouettes and contours too, as an Arrow table (the extra `perdure[parquet]`).
+
+        The plain columns are those of `to_pandas`; `mask`, `believed` and `outline` are structs as in the run log.
+        """
+        from perdure.types.arrow import to_arrow
+
+        return to_arrow(self)
+
+    @staticmethod
+    def of_arrow(table: pyarrow.Table) -> Tracks:
+        """Return the tracks of an Arrow table with the columns of `to_arrow`; frame, id, x1, y1, x2 and y2 at least.
+
+        Raises
+        ------
+        ValueError
+            Naming the column, and the row from 0 where there is one, that cannot be read.
+        """
+        from perdure.types.arrow import of_arrow
+
+        return of_arrow(table)
 
     def equals(self, other: Tracks) -> bool:
         """Return whether both say the same, row by row."""
