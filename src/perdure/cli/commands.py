@@ -13,6 +13,7 @@ import typer
 from perdure import __version__
 from perdure.cli.calibrate import calibrate
 from perdure.cli.context import context
+from perdure.cli.convert import convert
 from perdure.cli.count import count
 from perdure.cli.demo import demo
 from perdure.cli.detect import detect
@@ -53,7 +54,7 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, live, detect, draw, export, count, calibrate, context, explain, scenarios, demo, warmup):
+for command in (track, live, detect, draw, export, convert, count, calibrate, context, explain, scenarios, demo, warmup):
     app.command()(_interruptible(command))
 app.command(cls=LearnCommand)(_interruptible(learn))
 app.command("learn-zones")(_interruptible(learn_zones))

@@ -13,47 +13,33 @@ import typer
 
 from perdure import params
 from perdure.cli import options
+from perdure.cli.convert import say
 from perdure.errors import FormatError, OutputError, ParameterError
 from perdure.files import mask_pngs
 from perdure.files.contours import (
     POINT_COLUMNS,
     contours_of,
-    wkt_of,
     write_features,
     write_geojson_begin,
     write_geojson_end,
     write_points,
 )
 from perdure.files.folders import refuse_existing_folder, whole_folder
+from perdure.files.formats import named, table
+from perdure.files.formats.converting import write
+from perdure.files.formats.run import content_of
 from perdure.files.log import read_log
 from perdure.files.mot import write_rows
 from perdure.files.mots import write_masks
 from perdure.files.runs import Reporting, RunFolder
 from perdure.files.whole import refuse_existing, whole_file
 from perdure.fold import Corrections, settle_with
-from perdure.types import Ground, Status, Tracks
+from perdure.types import Tracks
 
-CSV_COLUMNS = (
-    "frame",
-    "time",
-    "id",
-    "x1",
-    "y1",
-    "x2",
-    "y2",
-    "status",
-    "confidence",
-    "class",
-    "group",
-    "inferred",
-    "hidden_side",
-    "visibility",
-    "contour",
-)
-GROUND_COLUMNS = ("ground_x", "ground_y", "ground_speed")  # m, m/s; of a run whose ground plane is known
-FORMATS = ("csv", "mot", "mots", "mask-png", "geojson", "contour-csv", "svg")
+OWN = ("csv", "mot", "mots", "mask-png", "geojson", "contour-csv", "svg")  # written frame by frame
+WHOLE = ("coco-vis", "coco-video", "cvat", "cvat-mask", "kitti", "parquet")  # written by `perdure.files.formats`
 FOLDERS = {"mask-png": mask_pngs.SUFFIX, "svg": ".svg"}  # of one file a frame, with this suffix
-OF_BOXES = ("csv", "mot")
+OF_BOXES = ("csv", "mot", "cvat", "kitti")
 
 
 @options.with_parameters(("", {"What counts": Reporting}))
@@ -79,7 +65,8 @@ def export(
             help="mot: MOTChallenge text, frames and pixels from 1; csv: all plain columns, frames and pixels from 0; "
             "mots: MOTS text, silhouettes, frames from 1; mask-png: a folder with a picture a frame, pixel = id; "
             "contours between pixels: geojson: polygons with holes; contour-csv: a line a point; svg: a folder with a "
-            "drawing a frame, dashed where not seen.",
+            "drawing a frame, dashed where not seen; for other programs: coco-vis (YouTube-VIS), coco-video, cvat (CVAT for "
+            "video 1.1, boxes), cvat-mask (silhouettes), kitti, parquet.",
         ),
     ] = "mot",
     believed: Annotated[
@@ -92,17 +79,21 @@ def export(
     json_: options.JsonOption = False,
 ) -> None:
     """Write the rows of RUN that count in another format."""
-    if format_ not in FORMATS:
-        raise ParameterError(params.unknown_name("format", format_, FORMATS))
+    if format_ not in (known := (*OWN, *WHOLE)):
+        raise ParameterError(params.unknown_name("format", format_, known))
     if believed and format_ in OF_BOXES:
         raise ParameterError(
             f"--believed does not go with --format {format_}: what it says is of the whole already"
         )
+    if believed and format_ == "parquet":
+        raise ParameterError("--believed does not go with --format parquet, which holds both silhouettes")
     _refuse(output, run, format_, overwrite=overwrite)
     folder = RunFolder.open(run)
     reporting = params.build(Reporting, {**folder.read_about().get("reporting", {}), **chosen})
     if format_ == "mask-png":
         written = _write_pictures(output, folder, reporting, believed=believed, overwrite=overwrite)
+    elif format_ in WHOLE:
+        written = _write_whole(output, folder, reporting, format_, believed=believed, overwrite=overwrite)
     elif format_ == "svg":
         written = _write_drawings(output, folder, reporting, believed=believed, overwrite=overwrite)
     else:
@@ -168,6 +159,17 @@ def _write_text(
     with whole_file(output) as file:
         written = writers[format_](file, folder, rows(), believed)
     return _Written(written, counted - written)
+
+
+def _write_whole(
+    output: Path, folder: RunFolder, reporting: Reporting, format_: str, *, believed: bool, overwrite: bool
+) -> _Written:
+    """Write one file of which the format wants to know all rows at once, and warn of what it does not hold."""
+    content = content_of(folder, folder.read_about(), reporting.report_confidence)
+    content = content.replace(tracks=_as_asked(content.tracks, believed))
+    written = write(output, content, "run", named(format_, WHOLE), overwrite=overwrite)
+    say(written)
+    return _Written(written.rows)
 
 
 def _write_pictures(
@@ -262,39 +264,12 @@ def _write_points(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], be
 
 
 def _write_csv(file: IO[str], folder: RunFolder, frames: Iterator[Tracks], believed: bool) -> int:
-    table, count = csv.writer(file, lineterminator="\n"), 0
-    on_ground = bool(folder.read_about().get("ground"))
-    table.writerow((*CSV_COLUMNS, *(GROUND_COLUMNS if on_ground else ())))
+    count, on_ground = 0, bool(folder.read_about().get("ground"))
+    table.write_names(file, on_ground=on_ground)
     for rows in frames:
-        table.writerows(_csv_lines(rows, on_ground))
+        table.write_lines(file, rows, on_ground=on_ground)
         count += len(rows)
     return count
-
-
-def _csv_lines(rows: Tracks, on_ground: bool) -> Iterator[list[object]]:
-    visibility = rows.visibility
-    for i in range(len(rows)):
-        yield [
-            rows.frames[i],
-            f"{rows.times[i]:.3f}",
-            rows.ids[i],
-            *(f"{side:.2f}" for side in rows.boxes[i]),
-            Status(rows.status[i]).word,
-            f"{rows.confidence[i]:.4g}",
-            rows.classes[i],
-            rows.groups[i],
-            int(rows.inferred[i]),
-            rows.hidden_side[i],
-            f"{visibility[i]:.4g}",
-            wkt_of(rows.outlines[i]),
-            *(_ground_cells(rows.ground[i]) if on_ground else ()),
-        ]
-
-
-def _ground_cells(place: Ground | None) -> tuple[object, ...]:
-    """X, Y and speed; empty where not known."""
-    x, y, speed = (None, None, None) if place is None else place
-    return tuple("" if one is None else f"{one:.3f}" for one in (x, y, speed))
 
 
 _LONGEST_SIDE = 1 << 16  # px

@@ -68,7 +68,10 @@ def mask_of(outline: Outline) -> Mask:
     begins = points - (left, top)
     ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in outline.rings]) - (left, top)
     low, high = np.minimum(begins[:, 1], ends[:, 1]), np.maximum(begins[:, 1], ends[:, 1])
-    first, last = np.ceil(low - 0.5).astype(int), np.ceil(high - 0.5).astype(int)  # rows whose middle an edge passes
+    first, last = (
+        np.ceil(low - 0.5).astype(int),
+        np.ceil(high - 0.5).astype(int),
+    )  # rows whose middle an edge passes
     counts = last - first
     if max(width * height, int(counts.sum())) > _LARGEST:
         raise ValueError(f"an outline of {width}x{height} pixels is too large to be drawn")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from perdure.errors import FormatError
 from perdure.features.masks import of_picture_runs, picture_runs
+from perdure.files import mot_table
 from perdure.files.span import shown
 from perdure.types import Mask, Rows, Tracks, Use
 
@@ -55,15 +56,18 @@ def read_masks(path: Path) -> Rows:
     )
 
 
+def is_mots(path: Path) -> bool:
+    """Return whether a text holds silhouettes: six words between blanks, of which the last is no number."""
+    first = next((line for line in mot_table.read_lines(path) if line.strip()), "")
+    words = first.split()
+    return "," not in first.partition(" ")[0] and len(words) == 6 and not _is_number(words[5])
+
+
 def read_lines(path: Path) -> list[MotsRow]:
     """Return what the lines of a MOTS file say, in their order; refused is what `read_masks` refuses."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"cannot read {path}: {getattr(error, 'strerror', None) or 'it is not text'}") from error
     rows: list[MotsRow] = []
     seen: dict[tuple[int, int], int] = {}
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(mot_table.read_lines(path), 1):
         if not line.strip():
             continue
         try:
@@ -144,13 +148,23 @@ def _row(line: str) -> MotsRow:
         raise ValueError(f"id {identity} is below 1")
     if not (1 <= height <= _LONGEST_SIDE and 1 <= width <= _LONGEST_SIDE and height * width <= _LARGEST_AREA):
         raise ValueError(f"a picture of {width}x{height} cannot be")
-    return MotsRow(frame - 1, identity, kind, use, (height, width), of_picture_runs(unpacked_runs(words[5]), height, width))
+    return MotsRow(
+        frame - 1, identity, kind, use, (height, width), of_picture_runs(unpacked_runs(words[5]), height, width)
+    )
 
 
 def _number(word: str, name: str) -> int:
     if not re.fullmatch(r"[+-]?[0-9]{1,18}", word):
         raise ValueError(f"the {name} {shown(word)} is not a whole number")
     return int(word)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _by(size: tuple[int, int]) -> str:

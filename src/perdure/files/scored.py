@@ -13,7 +13,8 @@ from perdure.files import mask_pngs, mots
 from perdure.files.clip import read_blobs, read_clip
 from perdure.files.images import natural_order
 from perdure.files.mot import protocol_of, read_said, read_truth
-from perdure.files.mot_table import read_lines, read_table
+from perdure.files.mot_table import read_table
+from perdure.files.mots import is_mots
 from perdure.files.runs import Reporting, RunFolder
 from perdure.types import Event, Rows, Tracks
 
@@ -195,13 +196,6 @@ def read_scored_truth(path: Path, *, masks: bool, protocol: str = "auto") -> Tru
     return Truth(path, read_truth(boxes, used).replace(size=size), seen, used, events, shared)
 
 
-def is_mots(path: Path) -> bool:
-    """Return whether a text holds silhouettes: six words between blanks, of which the last is no number."""
-    first = next((line for line in read_lines(path) if line.strip()), "")
-    words = first.split()
-    return "," not in first.partition(" ")[0] and len(words) == 6 and not _is_number(words[5])
-
-
 def _read_run(folder: RunFolder, masks: bool, report_confidence: float | None) -> Result:
     about = folder.read_about()
     given = {} if report_confidence is None else {"report_confidence": report_confidence}
@@ -280,11 +274,3 @@ def name_of(path: Path) -> str:
         return stem
     home = path.resolve().parent
     return home.parent.name if home.name == "gt" else home.name
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

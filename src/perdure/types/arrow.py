@@ -58,7 +58,7 @@ def of_arrow(table: pyarrow.Table) -> Tracks:
     if missing:
         raise ValueError(f"it has no column {missing[0]!r}; wanted are {', '.join(NEEDED)} at least")
     boxes = np.stack([_numbers(table, name, np.float32) for name in ("x1", "y1", "x2", "y2")], axis=1)
-    columns = {
+    columns: dict[str, Any] = {
         "frames": _numbers(table, "frame", np.int64),
         "ids": _numbers(table, "id", np.int64),
         "times": _numbers(table, "time", np.float64) if "time" in table.column_names else 0.0,
@@ -142,7 +142,7 @@ def _is_real(kind: Any) -> bool:
 
 
 def _values(table: pyarrow.Table, name: str, kind: type) -> list[Any]:
-    values = table.column(name).to_pylist()
+    values: list[Any] = table.column(name).to_pylist()
     for row, one in enumerate(values):
         if one is not None and not isinstance(one, kind):
             raise ValueError(f"row {row}: column {name!r} holds {type(one).__name__}")

@@ -20,7 +20,9 @@ def checked(path: Path, content: Content) -> Content:
         f"a frame that is not from 0 to {LAST}": (tracks.frames < 0) | (tracks.frames > LAST),
         f"an id that is not from 0 to {LARGEST_ID}": (tracks.ids < 0) | (tracks.ids > LARGEST_ID),
         "a group below 0": tracks.groups < 0,
-        "a box that is inside out or too far out": (x1 > x2) | (y1 > y2) | (np.abs(tracks.boxes) > FARTHEST).any(axis=1),
+        "a box that is inside out or too far out": (x1 > x2)
+        | (y1 > y2)
+        | (np.abs(tracks.boxes) > FARTHEST).any(axis=1),
     }
     for what, wrong in faults.items():
         _refuse(path, what, wrong)

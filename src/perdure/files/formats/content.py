@@ -215,9 +215,13 @@ class Gathering:
         return float(value)
 
     def _box(self, place: str, box: Iterable[Any]) -> tuple[float, ...]:
-        sides = tuple(self._real(place, f"{side} of the box", one, FARTHEST) for side, one in zip(_SIDES, box, strict=True))
+        sides = tuple(
+            self._real(place, f"{side} of the box", one, FARTHEST) for side, one in zip(_SIDES, box, strict=True)
+        )
         if sides[0] > sides[2] or sides[1] > sides[3]:
-            raise self.refuse(place, f"a box from ({sides[0]:g}, {sides[1]:g}) to ({sides[2]:g}, {sides[3]:g}) is inside out")
+            raise self.refuse(
+                place, f"a box from ({sides[0]:g}, {sides[1]:g}) to ({sides[2]:g}, {sides[3]:g}) is inside out"
+            )
         return sides
 
 

@@ -30,10 +30,13 @@ def read_json(path: Path) -> Any:
 
 def size_of(place: object, value: Mapping[str, Any]) -> tuple[int, int]:
     """Return the height and width that a value tells; FormatError where they cannot be."""
-    height, width = value.get("height"), value.get("width")
+    height: Any = value.get("height")
+    width: Any = value.get("width")
     for side in (height, width):
         if type(side) is not int or not 1 <= side <= LONGEST_SIDE:
-            raise FormatError(f"{place}: height and width must be whole numbers from 1 to {LONGEST_SIDE}, not {shown(side)}")
+            raise FormatError(
+                f"{place}: height and width must be whole numbers from 1 to {LONGEST_SIDE}, not {shown(side)}"
+            )
     if height * width > LARGEST_AREA:
         raise FormatError(f"{place}: a picture of {width}x{height} is too large")
     return height, width

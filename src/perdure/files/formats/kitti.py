@@ -83,7 +83,9 @@ def write(path: Path, content: Content, *, overwrite: bool) -> int:
         for k in range(len(tracks)):
             kind = str(tracks.classes[k]) or FORMAT.unnamed
             if len(kind.split()) != 1:
-                raise OutputError(f"class {kind!r} has a blank, which a KITTI label cannot hold; give another by --class")
+                raise OutputError(
+                    f"class {kind!r} has a blank, which a KITTI label cannot hold; give another by --class"
+                )
             box = " ".join(f"{short(side):.12g}" for side in tracks.boxes[k])
             occluded = _OCCLUDED[Status(tracks.status[k])]
             score = f" {short(tracks.confidence[k]):.12g}" if scored else ""

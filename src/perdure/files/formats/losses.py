@@ -50,7 +50,9 @@ def _lost_words(tracks: Tracks, format_: Format) -> list[Loss]:
         found += [Loss(f"classes other than {' and '.join(format_.classes)}", others)] if others else []
     none = int(np.count_nonzero(tracks.classes == ""))
     if none and format_.unnamed:
-        found.append(Loss(f"that no class is known: it says {format_.unnamed!r} there; --class names another", none))
+        found.append(
+            Loss(f"that no class is known: it says {format_.unnamed!r} there; --class names another", none)
+        )
     return found
 
 
@@ -86,7 +88,8 @@ def _has_outline(tracks: Tracks) -> NDArray[np.bool_]:
 
 
 def _has_own_box(tracks: Tracks) -> NDArray[np.bool_]:
-    return _has_mask(tracks) & (tracks.boxes != tracks.visible_boxes).any(axis=1)
+    differs = (tracks.boxes != tracks.visible_boxes).any(axis=1)
+    return np.asarray(_has_mask(tracks) & differs)
 
 
 def _is_covered(tracks: Tracks) -> NDArray[np.bool_]:

@@ -22,9 +22,7 @@ def read(path: Path, reading: Reading) -> Content:
     """Return the silhouettes of a folder; 255 of 8 bits is no object where there are others, and a note says so."""
     rows = mask_pngs.read_masks(path, void=True)
     objects = rows.take(rows.use == Use.SCORED)
-    tracks = Tracks.of(
-        frames=objects.frames, times=0.0, ids=objects.ids, boxes=objects.boxes, masks=objects.masks
-    )
+    tracks = Tracks.of(frames=objects.frames, times=0.0, ids=objects.ids, boxes=objects.boxes, masks=objects.masks)
     frames = tuple(frame for frame, _ in mask_pngs.pictures_in(path))
     areas = len(rows) - len(objects)
     notes = (f"void areas (255) left out: {areas}",) if areas else ()

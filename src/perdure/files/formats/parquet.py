@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from perdure.errors import FormatError
-from perdure.files.formats.content import Content, Format, Reading
 from perdure.files.formats.checked import checked
+from perdure.files.formats.content import Content, Format, Reading
 from perdure.files.formats.traits import ALL
 from perdure.files.whole import cannot_write, refuse_existing
 from perdure.types.arrow import arrow, of_arrow, to_arrow
@@ -46,7 +46,15 @@ def read(path: Path, reading: Reading) -> Content:
         )
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or _first_line(error)}") from error
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, pa.ArrowException) as error:
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        AttributeError,
+        RecursionError,
+        pa.ArrowException,
+    ) as error:
         raise FormatError(f"{path}: {_first_line(error)}") from error
     return checked(path, content)
 
@@ -57,7 +65,12 @@ def write(path: Path, content: Content, *, overwrite: bool) -> int:
     import pyarrow.parquet
 
     refuse_existing(path, overwrite=overwrite)
-    told: dict[str, Any] = {"size": content.size, "frames": content.frames, "fps": content.fps, "name": content.name}
+    told: dict[str, Any] = {
+        "size": content.size,
+        "frames": content.frames,
+        "fps": content.fps,
+        "name": content.name,
+    }
     told = {name: value for name, value in told.items() if value}
     table = to_arrow(content.tracks).replace_schema_metadata({_KEY: json.dumps(told)})
     part = path.with_name(f".{path.name}.part")

@@ -89,12 +89,12 @@ def write(path: Path, content: Content, *, overwrite: bool) -> int:
 
 def write_names(file: IO[str], *, on_ground: bool) -> None:
     """Write the line of names."""
-    _writer(file).writerow((*COLUMNS, *(GROUND_COLUMNS if on_ground else ())))
+    csv.writer(file, lineterminator="\n").writerow((*COLUMNS, *(GROUND_COLUMNS if on_ground else ())))
 
 
 def write_lines(file: IO[str], rows: Tracks, *, on_ground: bool) -> None:
     """Write a line a row."""
-    _writer(file).writerows(_lines(rows, on_ground))
+    csv.writer(file, lineterminator="\n").writerows(_lines(rows, on_ground))
 
 
 def _lines(rows: Tracks, on_ground: bool) -> Iterator[list[object]]:
@@ -121,10 +121,6 @@ def _ground_cells(place: Ground | None) -> tuple[object, ...]:
     """X, Y and speed; empty where not known."""
     x, y, speed = (None, None, None) if place is None else place
     return tuple("" if one is None else f"{one:.3f}" for one in (x, y, speed))
-
-
-def _writer(file: IO[str]) -> csv.Writer:
-    return csv.writer(file, lineterminator="\n")
 
 
 def _text(path: Path) -> str:
