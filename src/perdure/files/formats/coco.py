@@ -19,6 +19,7 @@ from perdure.files.mots import packed_runs, unpacked_runs
 from perdure.files.span import shown
 from perdure.types import Mask, Tracks
 
+FILM = "film"  # the name of one that has none
 UNNAMED = "object"  # the category of rows without a class; read as none
 Json = Any
 
@@ -98,7 +99,7 @@ def written_categories(numbers: Mapping[str, int]) -> list[Json]:
 def written_video(content: Content, height: int, width: int) -> dict[str, Json]:
     """Return what is written of a film, without its pictures."""
     rate = content.fps or rate_of(content.tracks)
-    about = {"id": 1, "name": content.name or "film", "width": width, "height": height}
+    about = {"id": 1, "name": content.name or FILM, "width": width, "height": height}
     return about | ({"fps": rate} if rate else {})
 
 
@@ -109,8 +110,8 @@ def rate_told(video: Mapping[str, Json]) -> float | None:
 
 
 def image_name(content: Content, frame: int) -> str:
-    """Return the name of a frame's picture: the film's own, or the frame's number in six digits."""
-    return content.images.get(frame, f"{frame:06d}.jpg")
+    """Return the name of a frame's picture: the film's own, or one made of the film's name and the frame's number."""
+    return content.images.get(frame, f"{content.name or FILM}/{frame:06d}.jpg")
 
 
 def commonest(column: NDArray[Any]) -> Any:

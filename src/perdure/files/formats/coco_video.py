@@ -38,9 +38,9 @@ def read(path: Path, reading: Reading) -> Content:
     document = coco.read_document(path)
     video = coco.wanted_video(path, document["videos"], reading.video) if document["videos"] else {}
     pictures = [one for one in document["images"] if not video or one.get("video_id") == video.get("id")]
-    if not pictures:
-        raise FormatError(f"{path} holds no images{' of this video' if video else ''}, so no frames")
-    size, frames = _size(path, pictures), _frames(path, pictures)
+    if not pictures and not video:
+        raise FormatError(f"{path} holds neither images nor videos, so no frames")
+    size, frames = _size(path, pictures or [video]), _frames(path, pictures)
     kinds = coco.read_categories(path, document["categories"])
     rows, crowds, known = Gathering(path), 0, {one["id"] for one in document["images"] if _has_id(one)}
     for number, annotation in enumerate(document["annotations"], 1):

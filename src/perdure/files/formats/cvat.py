@@ -89,7 +89,7 @@ def _declared(name: str) -> str:
     """The declaration of an attribute of a label."""
     kind, default, values = {
         "status": ("select", Status.VISIBLE.word, "\n".join(one.word for one in Status)),
-        "confidence": ("number", "1", "0\n1\n0.001"),
+        "confidence": ("text", "1", "1"),
     }[name]
     return (
         f"            <attribute>\n              <name>{name}</name>\n              <mutable>True</mutable>\n"

@@ -81,5 +81,5 @@ FORMAT = Format(
     write,
     suffixes=(".txt",),
     holds=frozenset({Trait.BOX, Trait.CONFIDENCE, Trait.CHANGING_CONFIDENCE}),
-    rounds={"boxes": 0.01},
+    rounds={"boxes": 0.01, "confidence": 1e-4},
 )

@@ -207,6 +207,6 @@ FORMAT = Format(
     write,
     suffixes=(".csv",),
     holds=ALL - {Trait.MASK, Trait.BELIEVED, Trait.LINKS},
-    rounds={"boxes": 0.01, "times": 0.001},
+    rounds={"boxes": 0.01, "times": 0.001, "confidence": 1e-4},
 )
 _LONGEST_LINE = 4096
