@@ -81,7 +81,9 @@ def boxes(draw: st.DrawFn, step: float | None) -> list[float]:
 
 
 @st.composite
-def said(draw: st.DrawFn, *, step: float | None = None, seen: bool = False, classes: tuple[str, ...] = ("", "dog")) -> Tracks:
+def said(
+    draw: st.DrawFn, *, step: float | None = None, seen: bool = False, classes: tuple[str, ...] = ("", "dog")
+) -> Tracks:
     """Up to six rows: box, class and confidence; with `seen`, silhouettes instead of boxes."""
     keys = sorted(draw(st.sets(st.tuples(st.integers(0, 6), st.integers(1, 4)), max_size=6)))
     count = len(keys)

@@ -49,7 +49,12 @@ def kitti(folder: str, frames: int) -> dict:
 
 
 def vis(folder: str, frames: int) -> dict:
-    config = {"GT_FOLDER": f"{folder}/", "TRACKERS_FOLDER": f"{folder}/", "TRACKERS_TO_EVAL": [], "PRINT_CONFIG": False}
+    config = {
+        "GT_FOLDER": f"{folder}/",
+        "TRACKERS_FOLDER": f"{folder}/",
+        "TRACKERS_TO_EVAL": [],
+        "PRINT_CONFIG": False,
+    }
     benchmark = datasets.YouTubeVIS(config | {"SPLIT_TO_EVAL": "all"})
     raw = benchmark._load_raw_file("", benchmark.seq_list[0], is_gt=True)
     return {"gt": [[one.tolist() for one in raw["gt_ids"]], [silhouettes(one) for one in raw["gt_dets"]]]}

@@ -178,10 +178,12 @@ def mask_of(value: Json, size: tuple[int, int]) -> Mask:
     return of_picture_runs(np.array(counts, np.int64), height, width)
 
 
-def written_mask(mask: Mask, height: int, width: int) -> dict[str, Json] | None:
-    """Return a silhouette as packed run lengths; None where nothing of it is in the picture."""
+def written_mask(mask: Mask, height: int, width: int, *, packed: bool) -> dict[str, Json] | None:
+    """Return a silhouette as run lengths, packed into a text or as a list; None where nothing of it is in the picture."""
     runs = picture_runs(mask, height, width)
-    return {"size": [height, width], "counts": packed_runs(runs, height, width)} if len(runs) > 1 else None
+    if len(runs) < 2:
+        return None
+    return {"size": [height, width], "counts": packed_runs(runs, height, width) if packed else runs.tolist()}
 
 
 def _of_polygons(value: list[Json], height: int, width: int) -> Mask:

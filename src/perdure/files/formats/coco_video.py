@@ -168,7 +168,7 @@ def _annotation(
 ) -> dict[str, Any]:
     """What is written of one row."""
     tracks, size = content.tracks, content.sized("coco-video")
-    box, mask = coco.written_box(tracks.boxes[row]), coco.written_mask(tracks.masks[row], *size)
+    box, mask = coco.written_box(tracks.boxes[row]), coco.written_mask(tracks.masks[row], *size, packed=True)
     identity = int(tracks.ids[row])
     return {
         "id": row + 1,

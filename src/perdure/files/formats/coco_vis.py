@@ -1,4 +1,7 @@
-"""YouTube-VIS: COCO with an annotation a track, whose lists have a silhouette or null for each frame of the film."""
+"""YouTube-VIS: COCO with an annotation a track, whose lists have a silhouette or null for each frame of the film.
+
+Run lengths are lists of numbers, as in the benchmark's own files: its tools do not read packed ones in a truth.
+"""
 
 from __future__ import annotations
 
@@ -136,7 +139,7 @@ def _annotation(
     """What is written of one id."""
     lists: dict[str, list[Any]] = {name: [None] * length for name in ("segmentations", "bboxes", "areas")}
     for frame, box, mask in zip(rows.frames.tolist(), rows.boxes, rows.masks, strict=True):
-        lists["segmentations"][frame] = coco.written_mask(mask, *size)
+        lists["segmentations"][frame] = coco.written_mask(mask, *size, packed=False)
         lists["bboxes"][frame] = written = coco.written_box(box)
         lists["areas"][frame] = mask.area if mask.bits.size else written[2] * written[3]
     about: dict[str, Any] = {
