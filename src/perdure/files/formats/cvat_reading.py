@@ -60,6 +60,8 @@ def read(path: Path, reading: Reading) -> Content:
     except expat.ExpatError as error:
         why = expat.errors.messages[error.code]
         raise FormatError(f"{path}, line {error.lineno}: not XML ({why}); is the file whole?") from None
+    except (LookupError, ValueError) as error:
+        raise FormatError(f"{path}, line 1: its encoding cannot be read ({error}); save it as UTF-8") from None
     return reader.content()
 
 
@@ -243,7 +245,8 @@ class _Reader:
         if shape.is_polygon:
             outline = _outline_of(points)
             mask = mask_of(outline)
-        box = mask.box if shape.mask is not None and mask is not None else _around(points)
+            points = np.stack([points.min(axis=0), points.max(axis=0)])
+        box = points.ravel().tolist() if shape.mask is None else shape.mask.box
         status, confidence = self._status(place, shape), self._confidence(place, shape)
         self._rows.add(
             place,
@@ -314,10 +317,6 @@ def _outline_of(points: np.ndarray[Any, Any]) -> Outline:
     """The outline of a polygon's points, round it with the clock."""
     outline = Outline.of([points])
     return outline if outline.area >= 0 else Outline.of([points[::-1]])
-
-
-def _around(points: np.ndarray[Any, Any]) -> list[float]:
-    return [*points.min(axis=0).tolist(), *points.max(axis=0).tolist()]
 
 
 _FLAGS = {"outside": "0", "occluded": "0", "keyframe": "1"}

@@ -190,7 +190,8 @@ def outline_of_wkt(text: str) -> Outline | None:
     import shapely
 
     try:
-        shape = shapely.from_wkt(text)
+        with np.errstate(all="ignore"):  # a number too large becomes infinite, which `Outline` refuses
+            shape = shapely.from_wkt(text)
     except shapely.errors.ShapelyError as error:
         raise ValueError(f"{shown(text)} is not well-known text") from error
     if shape.geom_type not in ("Polygon", "MultiPolygon"):
