@@ -105,8 +105,8 @@ def convert(
         written = _convert_several(source, output, to, wishes, overwrite=overwrite)
     else:
         target = for_output(output) if to is None else named(to, WRITTEN)
-        content, found = gathered(source, read_as, wishes)
-        written = [write(output, content, found.name, target, overwrite=overwrite)]
+        content, source_format = gathered(source, read_as, wishes)
+        written = [write(output, content, source_format.name, target, overwrite=overwrite)]
     for one in written:
         say(one)
     _print(written, output, json_=json_)
@@ -151,19 +151,20 @@ def _convert_several(
     source: Path, output: Path, to: str | None, wishes: Wishes, *, overwrite: bool
 ) -> list[Written]:
     """Convert the files in a folder, each to one of the same name."""
+    found = sequences_in(source)
     if to is None:
         raise ParameterError(f"{source} holds files of several sequences; name the format of the new ones by --to")
     target = named(to, WRITTEN)
     if target.is_folder:
         raise ParameterError(f"{target.name} is a folder a sequence; convert the files in {source} one by one")
-    paths = {path.with_suffix(target.suffixes[0]).name: path for path in sequences_in(source)}
-    if len(paths) < len(sequences_in(source)):
+    paths = {path.with_suffix(target.suffixes[0]).name: path for path in found}
+    if len(paths) < len(found):
         raise OutputError(f"{source} holds files that differ in their suffix only; convert them one by one")
     written = []
     with whole_files(output, paths, overwrite=overwrite) as part:
         for name, path in paths.items():
-            content, found = gathered(path, None, wishes)
-            one = write(part / name, content, found.name, target, overwrite=False)
+            content, read_as = gathered(path, None, wishes)
+            one = write(part / name, content, read_as.name, target, overwrite=False)
             written.append(replace(one, path=output / name))
     return written
 

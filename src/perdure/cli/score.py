@@ -30,6 +30,7 @@ _PROTOCOLS = {
     "mot17": "MOT17: pedestrians whose flag is not 0; rows said on a distractor (class 2, 7, 8, 12) are taken away",
     "mot20": "MOT20: pedestrians whose flag is not 0; rows said on a distractor (class 2, 6, 7, 8, 12) are taken away",
     "mots": "MOTS: objects of all classes alike; rows said for more than half in an ignored area (class 10), and on nothing else, are taken away",
+    "rows": "other formats: every row of the truth counts",
     "masks": "index PNGs: every object of the truth counts; 255 is void where it is not the only value",
 }
 
@@ -49,7 +50,8 @@ def score(
         Optional[list[Path]],  # noqa: UP045 - typer reads this at run time
         typer.Argument(
             metavar="RESULT...",
-            help="Run folders, MOT or MOTS text, folders of index PNGs, or folders of these.",
+            help="Run folders, MOT or MOTS text, folders of index PNGs, files of any format of `perdure convert`, or "
+            "folders of these.",
             show_default=False,
         ),
     ] = None,
@@ -59,7 +61,7 @@ def score(
             "--truth",
             metavar="TRUTH...",
             help="As many, of the same names or in the same order: MOT or MOTS text, folders of index PNGs, "
-            "folders with gt/gt.txt (and clip.json, gt/blobs.txt), or folders of these. One truth will do for "
+            "files of any format of `perdure convert`, folders with gt/gt.txt (and clip.json, gt/blobs.txt), or folders of these. One truth will do for "
             "several results.",
             show_default=False,
         ),

@@ -1,4 +1,7 @@
-"""What is at a path, for a comparison: a result (run folder, MOT or MOTS text, index PNGs), a truth (these, a clip)."""
+"""What is at a path, for a comparison: a result (run folder, MOT or MOTS text, index PNGs), a truth (these, a clip).
+
+Files of other formats, those of `perdure.files.formats`, are read as either; all their rows count.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from perdure import params
 from perdure.errors import FormatError, ParameterError
 from perdure.files import mask_pngs, mots
 from perdure.files.clip import read_blobs, read_clip
+from perdure.files.formats import FORMATS, read, recognised
 from perdure.files.images import natural_order
 from perdure.files.mot import protocol_of, read_said, read_truth
 from perdure.files.mot_table import read_table
@@ -19,6 +23,8 @@ from perdure.files.runs import Reporting, RunFolder
 from perdure.types import Event, Rows, Tracks
 
 _BOXES, _VISIBLE, _CLIP, _BLOBS = "gt/gt.txt", "gt/visible.txt", "clip.json", "gt/blobs.txt"
+_AS_ALWAYS = ("mot", "mots")  # formats with rules of their own for what counts
+_OTHERS = {suffix for one in FORMATS.values() for suffix in one.suffixes} - {".txt"}
 _PLAIN_NAMES = ("gt", "tracks", "visible", "amodal")  # of a file that its folder gives a better name
 
 
@@ -60,7 +66,7 @@ class Truth:
     ----------
     boxes, masks : Rows or None
     protocol : str
-        How rows are used: 'mot15', 'mot17', 'mot20', 'mots' or 'masks'.
+        How rows are used: 'mot15', 'mot17', 'mot20', 'mots', 'masks', or 'rows' of another format.
     events : tuple of Event or None
     blobs : frame → the ids in each connected blob, or None
     pictures : tuple of int or None
@@ -150,7 +156,7 @@ def read_result(path: Path, *, masks: bool, report_confidence: float | None = No
     Parameters
     ----------
     path : Path
-        A run folder, a MOT or MOTS text, a folder of index PNGs.
+        A run folder, a MOT or MOTS text, a folder of index PNGs, a file of another format.
     masks : bool
         Silhouettes are wanted, which of a run takes longer to read.
     report_confidence : float or None
@@ -166,6 +172,9 @@ def read_result(path: Path, *, masks: bool, report_confidence: float | None = No
     if path.is_dir():
         rows = mask_pngs.read_masks(path)
         return Result(path, rows, rows)
+    if _is_other(path):
+        rows, notes = _read_other(path)
+        return Result(path, rows, rows if rows.masks else None, notes=notes)
     if is_mots(path):
         rows = mots.read_masks(path)
         return Result(path, rows, rows)
@@ -180,6 +189,9 @@ def read_scored_truth(path: Path, *, masks: bool, protocol: str = "auto") -> Tru
     FormatError
         Naming file and line.
     """
+    if not path.is_dir() and _is_other(path):
+        rows, _ = _read_other(path)
+        return Truth(path, rows, rows if rows.masks else None, "rows")
     boxes = _in_folder(path) if path.is_dir() else path
     if boxes is None:
         pictures = [frame for frame, _ in mask_pngs.pictures_in(path)]
@@ -194,6 +206,18 @@ def read_scored_truth(path: Path, *, masks: bool, protocol: str = "auto") -> Tru
     seen = mots.read_masks(visible) if masks and visible.is_file() else None
     used = protocol_of(read_table(boxes)) if protocol == "auto" else protocol
     return Truth(path, read_truth(boxes, used).replace(size=size), seen, used, events, shared)
+
+
+def _is_other(path: Path) -> bool:
+    """Whether a file is of a format without rules of its own."""
+    known = path.is_file() and (path.suffix == ".txt" or path.suffix.lower() in _OTHERS)
+    return known and recognised(path).name not in _AS_ALWAYS
+
+
+def _read_other(path: Path) -> tuple[Rows, tuple[str, ...]]:
+    """The rows of a file of another format, and what was left out of it."""
+    content = read(path, recognised(path))
+    return Rows.of_tracks(content.tracks).replace(size=content.size), content.notes
 
 
 def _read_run(folder: RunFolder, masks: bool, report_confidence: float | None) -> Result:

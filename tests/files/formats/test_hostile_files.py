@@ -24,10 +24,18 @@ FEATURE = {
 
 
 def kitti(**changes: str) -> str:
-    words = (
-        dict(frame="0", id="1", kind="Car", cut="0", hidden="0", alpha="0", x1="1", y1="2", x2="3", y2="4")
-        | changes
-    )
+    words = {
+        "frame": "0",
+        "id": "1",
+        "kind": "Car",
+        "cut": "0",
+        "hidden": "0",
+        "alpha": "0",
+        "x1": "1",
+        "y1": "2",
+        "x2": "3",
+        "y2": "4",
+    } | changes
     return " ".join([*words.values(), *["0"] * 7]) + "\n"
 
 
@@ -36,12 +44,21 @@ def cvat(shape: str = "", track: str = '<track id="1" label="car">{}</track>', h
 
 
 def box(**changes: str) -> str:
-    words = dict(frame="0", outside="0", occluded="0", keyframe="1", xtl="1", ytl="2", xbr="3", ybr="4") | changes
+    words = {
+        "frame": "0",
+        "outside": "0",
+        "occluded": "0",
+        "keyframe": "1",
+        "xtl": "1",
+        "ytl": "2",
+        "xbr": "3",
+        "ybr": "4",
+    } | changes
     return "<box " + " ".join(f'{name}="{value}"' for name, value in words.items() if value != "-") + "/>"
 
 
 def mask(**changes: str) -> str:
-    words = dict(frame="0", rle="0, 4", left="1", top="1", width="2", height="2") | changes
+    words = {"frame": "0", "rle": "0, 4", "left": "1", "top": "1", "width": "2", "height": "2"} | changes
     return "<mask " + " ".join(f'{name}="{value}"' for name, value in words.items()) + "/>"
 
 
@@ -258,10 +275,12 @@ def test_a_file_cut_off_or_changed_anywhere_is_read_or_refused(
     else:
         at = data.draw(st.integers(0, len(good) - 1))
         path.write_bytes(good[:at] + data.draw(st.binary(min_size=1, max_size=3)) + good[at + 1 :])
+    refusal = ""
     try:
         read(path, FORMATS[name])
     except PerdureError as error:
-        assert str(path) in str(error)
+        refusal = str(error)
+    assert not refusal or (str(path) in refusal and "\n" not in refusal)
 
 
 @pytest.fixture(scope="module")
