@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from format_rows import everything
 
 from perdure.types import Frame, Mask, Regions, Scene, Status, Tracks
 
@@ -88,3 +89,23 @@ def test_a_frame_that_is_no_colour_picture_is_refused():
 def test_an_roi_of_another_size_is_refused():
     with pytest.raises(ValueError, match="the roi is 4x3, the scene 5x3"):
         Scene(5, 3, roi=np.ones((3, 4), bool))
+
+
+def test_an_arrow_table_has_every_column_and_reads_back_as_the_same_tracks():
+    pytest.importorskip("pyarrow")
+    table = everything().to_arrow()
+    assert Tracks.of_arrow(table).equals(everything())
+    assert Tracks.of_arrow(Tracks.empty().to_arrow()).equals(Tracks.empty())
+    assert table.column("status").to_pylist() == [
+        "visible", "visible", "partly_occluded", "ambiguous", "visible", "lost",
+    ]  # fmt: skip
+    assert table.column("ground_x").to_pylist() == [1.5, -3.0, None, None, None, None]
+    assert table.column("mask").to_pylist()[4] is None
+
+
+def test_of_an_arrow_table_only_frame_id_and_box_are_needed():
+    pyarrow = pytest.importorskip("pyarrow")
+    columns = {"frame": [3], "id": [1], "x1": [0.5], "y1": [1.0], "x2": [2.0], "y2": [3.0]}
+    assert Tracks.of_arrow(pyarrow.table(columns)).boxes.tolist() == [[0.5, 1, 2, 3]]
+    with pytest.raises(ValueError, match="no column 'x2'"):
+        Tracks.of_arrow(pyarrow.table({name: values for name, values in columns.items() if name != "x2"}))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from shapely.geometry import MultiPolygon, Polygon
 
-from perdure.features.outlines import outline_of, outline_of_box, polygons, seen_and_hidden, thinned
+from perdure.features.outlines import mask_of, outline_of, outline_of_box, polygons, seen_and_hidden, thinned
 from perdure.types import Mask, Outline
 
 
@@ -30,6 +30,20 @@ def test_the_outline_of_any_pixels_is_a_valid_shape_that_covers_them_and_nothing
         Polygon([(c, r), (c + 1, r), (c + 1, r + 1), (c, r + 1)]) for r, c in np.argwhere(bits) + np.array([y, x])
     ]
     assert all(found.covers(one) for one in pixels)
+
+
+@given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=8)), st.integers(-5, 5), st.integers(-5, 5))
+def test_the_pixels_inside_an_outline_are_those_that_it_was_made_of(bits, x, y):
+    before = Mask.of_image(bits, y, x)
+    assert mask_of(outline_of(before)) == before
+
+
+def test_a_pixel_is_inside_a_contour_if_its_middle_is():
+    triangle = Outline.of([[[0, 0], [4, 0], [0, 4]]])
+    assert mask_of(triangle) == mask("###", "##.", "#..")
+    assert mask_of(Outline(())) == Mask.empty()
+    with pytest.raises(ValueError, match="too large to be drawn"):
+        mask_of(Outline.of([[[0, 0], [9e5, 0], [9e5, 9e5]]]))
 
 
 def test_holes_belong_to_the_part_around_them_and_parts_that_touch_by_corners_are_two():

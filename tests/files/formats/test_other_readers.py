@@ -363,6 +363,15 @@ def test_a_sequence_of_motchallenge_brings_its_size_and_rate(tmp_path: Path):
     assert found.notes == ("rows that the truth does not ask for (flag 0), here of confidence 0: 1",)
 
 
+def test_what_pandas_writes_of_tracks_is_read(yard: Content, tmp_path: Path):
+    pytest.importorskip("pandas")
+    path = tmp_path / "a.csv"
+    tracks = yard.tracks.replace(groups=[0, 9, 0, 9, 0], inferred=[False, True, False, False, False])
+    tracks.to_pandas().to_csv(path, index=False)
+    back = read(path, recognised(path)).tracks
+    assert back.equals(tracks.replace(masks=[Mask.empty()] * 5))
+
+
 def test_a_table_of_another_program_needs_six_columns_only(tmp_path: Path):
     path = tmp_path / "a.csv"
     with path.open("w", newline="") as file:

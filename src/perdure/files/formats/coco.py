@@ -98,7 +98,7 @@ def written_categories(numbers: Mapping[str, int]) -> list[Json]:
 
 def written_video(content: Content, height: int, width: int) -> dict[str, Json]:
     """Return what is written of a film, without its pictures."""
-    rate = content.fps or rate_of(content.tracks)
+    rate = content.fps or (rate_of(content.tracks) if content.timed else None)
     about = {"id": 1, "name": content.name or FILM, "width": width, "height": height}
     return about | ({"fps": rate} if rate else {})
 

@@ -41,6 +41,23 @@ def read(path: Path, reading: Reading) -> Content:
     if not pictures and not video:
         raise FormatError(f"{path} holds neither images nor videos, so no frames")
     size, frames = _size(path, pictures or [video]), _frames(path, pictures)
+    rows, crowds = _rows(path, document, size, frames)
+    tracks, notes = counted_from_one(rows.tracks())
+    return Content(
+        tracks,
+        size,
+        tuple(sorted(frames.values())),
+        fps=coco.rate_told(video),
+        name=coco.video_name(video) if video else "",
+        images={frames[one["id"]]: one["file_name"] for one in pictures if isinstance(one.get("file_name"), str)},
+        notes=(*notes, f"annotations of crowds left out: {crowds}") if crowds else notes,
+    )
+
+
+def _rows(
+    path: Path, document: Mapping[str, list[Mapping[str, Any]]], size: tuple[int, int], frames: Mapping[int, int]
+) -> tuple[Gathering, int]:
+    """The rows in these pictures, and the number of annotations of crowds."""
     kinds = coco.read_categories(path, document["categories"])
     rows, crowds, known = Gathering(path), 0, {one["id"] for one in document["images"] if _has_id(one)}
     for number, annotation in enumerate(document["annotations"], 1):
@@ -56,16 +73,7 @@ def read(path: Path, reading: Reading) -> Content:
             _add(rows, place, annotation, kinds, size, frames[image])
         except (KeyError, TypeError, ValueError) as error:
             raise rows.refuse(place, coco.why(error)) from None
-    tracks, notes = counted_from_one(rows.tracks())
-    return Content(
-        tracks,
-        size,
-        tuple(sorted(frames.values())),
-        fps=coco.rate_told(video),
-        name=coco.video_name(video) if video else "",
-        images={frames[one["id"]]: one["file_name"] for one in pictures if isinstance(one.get("file_name"), str)},
-        notes=(*notes, f"annotations of crowds left out: {crowds}") if crowds else notes,
-    )
+    return rows, crowds
 
 
 def _has_id(picture: Mapping[str, Any]) -> bool:

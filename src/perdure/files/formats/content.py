@@ -237,8 +237,9 @@ def with_times(content: Content, fps: float | None) -> Content:
     """Return the content with a time for each row: frames / `fps` where that is given, or where rows have none."""
     if content.timed and fps is None:
         return content
-    rate = fps or content.fps or RATE
-    return content.replace(tracks=content.tracks.replace(times=content.tracks.frames / rate), fps=rate)
+    told = fps or content.fps
+    times = content.tracks.frames / (told or RATE)
+    return content.replace(tracks=content.tracks.replace(times=times), fps=told)
 
 
 def rate_of(tracks: Tracks) -> float | None:

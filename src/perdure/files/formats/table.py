@@ -49,7 +49,7 @@ def is_table(path: Path) -> bool:
 
 
 def read(path: Path, reading: Reading) -> Content:
-    """Return the rows of a table; columns that have other names than ours are passed over.
+    """Return the rows of a table; columns that have other names than ours, or `Tracks.to_pandas`'s, are passed over.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def _add(rows: Gathering, place: str, row: Mapping[str, str]) -> None:
     def number(name: str, default: float = 0.0) -> float:
         cell = row.get(name, "").strip()
         try:
-            return float(cell) if cell else default
+            return float(_YES_AND_NO.get(cell, cell)) if cell else default
         except ValueError:
             raise rows.refuse(place, f"{shown(cell)} in column {name!r} is no number") from None
 
@@ -153,8 +153,8 @@ def _add(rows: Gathering, place: str, row: Mapping[str, str]) -> None:
         time=number("time"),
         status=_status(rows, place, row.get("status", "")),
         confidence=number("confidence", 1.0),
-        kind=row.get("class", ""),
-        group=number("group"),
+        kind=row.get("class", row.get("classes", "")),
+        group=number("group" if "group" in row else "groups"),
         inferred=bool(number("inferred")),
         outline=outline,
         hidden_side=row.get("hidden_side", ""),
@@ -211,3 +211,4 @@ FORMAT = Format(
     rounds={"boxes": 0.01, "times": 0.001, "confidence": 1e-4},
 )
 _LONGEST_LINE = 4096
+_YES_AND_NO = {"True": "1", "False": "0"}  # as pandas writes them
