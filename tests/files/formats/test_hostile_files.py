@@ -215,6 +215,11 @@ WRONG = [
     ("a.xml", cvat('<polygon frame="0" points="1,2;3"/>'), "points '1,2;3' are not"),
     ("a.xml", "<annotations><image/></annotations>", "this is CVAT for images, which has no tracks"),
     ("a.xml", cvat(head='<?xml version="1.0" encoding="utf-z"?>'), "line 1: its encoding cannot be read"),
+    (
+        "a.xml",
+        cvat(box(), track='<track id="1" task_id="4">{0}</track><track id="2" task_id="5"/>'),
+        "several tasks",
+    ),
     ("a.xml", "<html></html>", "its first element is <html>"),
     ("a.xml", "<annotations>" + "<a>" * 50, "nested too deep"),
     ("a.parquet", "PAR1 and nothing else", "a.parquet"),

@@ -95,7 +95,8 @@ class _Reader:
         self._shapes: list[_Shape] = []
         self._attribute = ""
         self._others = 0
-        self._polygons: list[int] = []
+        self._has_polygons = False
+        self._tasks: set[str] = set()
 
     def begin(self, tag: str, attributes: dict[str, str]) -> None:
         self._words.clear()
@@ -108,6 +109,11 @@ class _Reader:
         if depth == 1 and tag == "image":
             self._refuse("this is CVAT for images, which has no tracks; export it as 'CVAT for video 1.1'")
         if depth == 1 and tag == "track":
+            self._tasks.add(attributes.get("task_id", ""))
+            if len(self._tasks) > 1:
+                self._refuse(
+                    "this is a project with several tasks, whose frames all count from 0; export one task"
+                )
             label = attributes.get("label", "")
             self._track = self._number(attributes, "id"), "" if label == UNNAMED else label
             self._shapes = []
@@ -143,7 +149,7 @@ class _Reader:
         count = told.get(("task", "size"), told.get(("job", "size"), ""))
         frames = tuple(range(int(count))) if count.isdecimal() and int(count) <= MOST_FRAMES else None
         tracks, notes = counted_from_one(self._rows.tracks())
-        if size is not None and self._polygons:  # what leaves the picture is cut
+        if size is not None and self._has_polygons:  # what leaves the picture is cut
             cut = [disjoint([mask], *size)[0] if mask.bits.size else mask for mask in tracks.masks]
             tracks = tracks.replace(masks=tuple(cut))
         if self._others:
@@ -163,7 +169,7 @@ class _Reader:
             points = self._corners(attributes)
         elif tag == "polygon":
             points = self._points(attributes.get("points", ""))
-            self._polygons.append(int(frame))
+            self._has_polygons = True
         else:
             mask = self._mask(attributes)
         return _Shape(self._line, int(frame), outside, occluded, not is_key, points, mask, tag == "polygon")

@@ -88,6 +88,8 @@ def _of_folder(path: Path) -> str | None:
 def _of_file(path: Path) -> str | None:
     """By the suffix; of those that several formats share, by the first words."""
     suffix = path.suffix.lower()
+    if path.name == run.LOG:
+        return run.FORMAT.name
     if suffix in (".json", ".geojson"):
         return _of_json(path)
     if suffix == ".csv":

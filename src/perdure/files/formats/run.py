@@ -12,15 +12,17 @@ from perdure.files.formats.traits import ALL
 from perdure.files.log import read_log
 from perdure.files.runs import Reporting, RunFolder
 
+LOG = "tracks.jsonl"
+
 
 def is_run(path: Path) -> bool:
     """Return whether a folder holds a run's log."""
-    return (path / "tracks.jsonl").is_file()
+    return (path / LOG).is_file()
 
 
 def read(path: Path, reading: Reading) -> Content:
     """Return the rows of a run that count, as its own `report_confidence` has it."""
-    folder = RunFolder.open(path)
+    folder = RunFolder.open(path.parent if path.name == LOG else path)
     about = folder.read_about()
     try:
         least = params.build(Reporting, dict(about.get("reporting", {}))).report_confidence
