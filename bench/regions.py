@@ -76,7 +76,7 @@ PEERS: dict[str, Callable[[], Any]] = {
     "LSBP": cv2.bgsegm.createBackgroundSubtractorLSBP,
     "CNT": cv2.bgsegm.createBackgroundSubtractorCNT,
 }
-OURS = tuple(name for name, kind in DETECTORS.items() if kind.needs_pixels and name != "people")  # it has no masks
+OURS = ("background",)  # others see boxes alone
 COLD = {f"{name}-cold": name for name in OURS if hasattr(DETECTORS[name], "prepare")}
 METHODS = (*OURS, *COLD, *PEERS)
 COMPOSITES = ("attractive", "behind2", "crossing2", "crowd8", "group4")

@@ -54,7 +54,21 @@ def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for command in (track, live, detect, draw, export, convert, count, calibrate, context, explain, scenarios, demo, warmup):
+for command in (
+    track,
+    live,
+    detect,
+    draw,
+    export,
+    convert,
+    count,
+    calibrate,
+    context,
+    explain,
+    scenarios,
+    demo,
+    warmup,
+):
     app.command()(_interruptible(command))
 app.command(cls=LearnCommand)(_interruptible(learn))
 app.command("learn-zones")(_interruptible(learn_zones))
