@@ -10,6 +10,7 @@ import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,7 @@ class Life:
     votes: tuple[float, ...] = ()
     gone: bool = False
 
-    @property
+    @cached_property
     def last(self) -> Float:
         """The newest row (10,) of its path."""
         return np.asarray(self.path[-1])
@@ -78,7 +79,7 @@ class Life:
         """Return the rows (T, 10) of its path from a time on."""
         return self.path[np.searchsorted(self.path[:, TIME], time - 1e-9) :]
 
-    @property
+    @cached_property
     def size(self) -> tuple[float, float]:
         """Its width and height lately, px."""
         lately = self.since(self.last[TIME] - _RECENT)
@@ -95,8 +96,14 @@ class Life:
         """For how long it has been there, s."""
         return float(self.last[TIME]) - self.born
 
+    @cached_property
+    def area_now(self) -> float:
+        """The area of its newest box, px."""
+        return float(self.last[WIDTH] * self.last[HEIGHT])
+
+    @cached_property
     def moving(self) -> Float:
-        """Return its speed (2,) in px/s, of the line through the last half second; NaN before there is one."""
+        """Its speed (2,) in px/s, of the line through the last half second; NaN before there is one."""
         lately = self.since(self.last[TIME] - PACE_OVER)
         lately = lately[lately[:, SEEN] > 0]
         if len(lately) < 2 or lately[-1, TIME] - lately[0, TIME] < _LEAST_PACE - 1e-9:
@@ -106,7 +113,7 @@ class Life:
 
     def pace(self) -> float:
         """Return its speed in own heights a second; NaN before there is one."""
-        return float(np.hypot(*self.moving())) / self.size[1]
+        return float(np.hypot(*self.moving)) / self.size[1]
 
     def speed(self) -> float:
         """Return its speed in m/s, where the ground is known; NaN elsewhere."""

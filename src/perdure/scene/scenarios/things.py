@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from perdure.scene.lives import HEIGHT, WIDTH, Life, X, Y
+from perdure.scene.lives import HEIGHT, Life, X, Y
 from perdure.scene.scenarios.moment import Moment, between
 from perdure.scene.scenarios.rules import Scenario
 from perdure.types import Event
@@ -72,7 +72,7 @@ def _new(scenario: Scenario, life: Life, moment: Moment) -> Thing | None:
         if len(life.path) > 1 and life.first < moment.frame - len(life.path):
             return None
         owner = _nearest(scenario, life, moment, scenario.near)
-        if not owner or _area(life) > _SMALLER * _area(moment.lives[owner]):
+        if not owner or life.area_now > _SMALLER * moment.lives[owner].area_now:
             return None
     x, y = _middle(life)
     return Thing(
@@ -119,7 +119,7 @@ def _judged(
 
 def _together(owner: Life, thing: Life, near: float) -> bool:
     """Whether a thing that has moved goes where its taker goes, as fast."""
-    one, other = owner.moving(), thing.moving()
+    one, other = owner.moving, thing.moving
     fastest = max(float(np.hypot(*one)), float(np.hypot(*other)))
     return between(owner, thing) <= near and bool(np.hypot(*(one - other)) <= _ALIKE * fastest)
 
@@ -152,7 +152,7 @@ def _nearest(scenario: Scenario, life: Life, moment: Moment, near: float) -> int
     best, found = near, 0
     for one in moment.present:
         other = moment.lives[one]
-        if one == life.id or _area(life) > _SMALLER * _area(other) or not moment.is_one(one, scenario.partner):
+        if one == life.id or life.area_now > _SMALLER * other.area_now or not moment.is_one(one, scenario.partner):
             continue
         distance = between(other, life)
         if distance <= best:
@@ -166,7 +166,3 @@ def _apart(owner: Life, thing: Life) -> float:
 
 def _middle(life: Life) -> tuple[float, float]:
     return float(life.last[X]), float(life.last[Y] - life.last[HEIGHT] / 2)
-
-
-def _area(life: Life) -> float:
-    return float(life.last[WIDTH] * life.last[HEIGHT])
