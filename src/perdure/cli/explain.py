@@ -14,7 +14,6 @@ import typer
 from perdure.cli import options
 from perdure.cli.tables import aligned
 from perdure.errors import ParameterError
-from perdure.files.log import read_log
 from perdure.files.runs import RunFolder
 from perdure.reasons import Reason, Told, most_doubtful, told
 from perdure.types import Event, Status
@@ -67,7 +66,7 @@ def explain(
             raise ParameterError(f"{'--frame' if all_ is False else '--all'} goes with an id; name it by --id")
         _overview(folder, most or MOST, as_json=json_)
         return
-    found = told(lambda: read_log(folder.log, with_masks=False), identity)
+    found = told(lambda: folder.entries(with_masks=False), identity)
     note = _note(found, folder.read_about())
     if note:
         print(f"perdure: note: {note}", file=sys.stderr)
@@ -86,7 +85,7 @@ def explain(
 
 def _overview(folder: RunFolder, most: int, *, as_json: bool) -> None:
     """Print the most doubtful links of a run."""
-    links = most_doubtful(lambda: read_log(folder.log, with_masks=False), most)
+    links = most_doubtful(lambda: folder.entries(with_masks=False), most)
     note = "" if links else _without_reasons(folder.read_about())
     if as_json:
         value = {"run": str(folder.path), "note": note, "links": [{"id": one, **_link(why)} for one, why in links]}

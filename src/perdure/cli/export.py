@@ -28,7 +28,6 @@ from perdure.files.folders import refuse_existing_folder, whole_folder
 from perdure.files.formats import named, table
 from perdure.files.formats.converting import write
 from perdure.files.formats.run import content_of
-from perdure.files.log import read_log
 from perdure.files.mot import write_rows
 from perdure.files.mots import write_masks
 from perdure.files.runs import Reporting, RunFolder
@@ -178,9 +177,9 @@ def _write_pictures(
     """Write a folder with a picture for each frame of the run."""
     height, width = _size(folder)
     frames = _frames_of(folder)
-    corrections = Corrections.of(one.report for one in read_log(folder.log, with_masks=False))
+    corrections = Corrections.of(one.report for one in folder.entries(with_masks=False))
     counted = largest = 0
-    for _, settled in settle_with(corrections, (one.report for one in read_log(folder.log, with_masks=False))):
+    for _, settled in settle_with(corrections, (one.report for one in folder.entries(with_masks=False))):
         rows = settled.counted(reporting.report_confidence)
         counted += len(rows)
         largest = max(largest, *rows.ids.tolist(), 0)
@@ -214,7 +213,7 @@ def _write_drawings(
 
 def _frames_of(folder: RunFolder) -> list[int]:
     """The frames of a run, also those in which nothing is said."""
-    return [entry.frame for entry in read_log(folder.log, with_masks=False) if entry.frame >= 0]
+    return [entry.frame for entry in folder.entries(with_masks=False) if entry.frame >= 0]
 
 
 def _as_asked(rows: Tracks, believed: bool) -> Tracks:

@@ -15,7 +15,6 @@ from perdure.cli import options
 from perdure.cli.pictures import new_picture
 from perdure.detect.occluders import no_passages, note, occluders
 from perdure.errors import FormatError, OutputError, ParameterError, PerdureError
-from perdure.files.log import read_log
 from perdure.files.runs import PARTS, RunFolder
 from perdure.files.video import Source, open_source
 from perdure.files.whole import refuse_existing
@@ -166,7 +165,7 @@ def _size(folder: RunFolder) -> tuple[int, int]:
 
 def _times(folder: RunFolder) -> tuple[float, float]:
     """Times of the run's first frame and its last."""
-    times = [entry.time for entry in read_log(folder.log, with_masks=False) if entry.frame >= 0]
+    times = [entry.time for entry in folder.entries(with_masks=False) if entry.frame >= 0]
     if not times:
         raise FormatError(f"{folder.log} holds no frame; `perdure track --overwrite` makes it anew")
     return min(times), max(times)

@@ -15,7 +15,6 @@ import typer
 from perdure.cli import options
 from perdure.cli.tables import aligned
 from perdure.errors import FormatError
-from perdure.files.log import read_log
 from perdure.files.runs import EVENT_COLUMNS, RunFolder
 from perdure.files.scenarios import SHIPPED, read_rules
 from perdure.files.whole import refuse_existing, whole_file
@@ -60,7 +59,7 @@ def scenarios(
     known = _zones(about, zones, width, height)
     interpreter = Interpreter.of(Scene(width, height, zones=known.zones, rules=known.rules), read_rules(scenarios))
     rows, _, _ = folder.read(with_masks=False)
-    frames = {entry.frame: entry.time for entry in read_log(folder.log, with_masks=False) if entry.frame >= 0}
+    frames = {entry.frame: entry.time for entry in folder.entries(with_masks=False) if entry.frame >= 0}
     told = over_run(interpreter, rows, list(frames), list(frames.values()))
     if output is not None:
         _write(output, told.events, frames)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError, ParameterError
-from perdure.files.log import read_log
 from perdure.files.runs import RunFolder
 from perdure.files.zones import read_zones, zones_of_json
 from perdure.fold import Corrections, settle_with
@@ -82,9 +81,9 @@ def zones_of(typed: Sequence[str], file: Path | None, own: Any, size: tuple[int,
 
 def run_rows(folder: RunFolder, report_confidence: float) -> tuple[Tracks, NDArray[np.int64], NDArray[np.float64]]:
     """Return the rows of a run that count, without silhouettes, and the frames of its film with their times."""
-    entries = [(one.frame, one.time) for one in read_log(folder.log, with_masks=False) if one.frame >= 0]
-    corrections = Corrections.of(one.report for one in read_log(folder.log, with_masks=False))
-    settled = settle_with(corrections, (one.report for one in read_log(folder.log, with_masks=False)))
+    entries = [(one.frame, one.time) for one in folder.entries(with_masks=False) if one.frame >= 0]
+    corrections = Corrections.of(one.report for one in folder.entries(with_masks=False))
+    settled = settle_with(corrections, (one.report for one in folder.entries(with_masks=False)))
     rows = Tracks.join(rows.counted(report_confidence) for _, rows in settled)
     frames, times = zip(*entries, strict=True) if entries else ((), ())
     return rows, np.array(frames, np.int64), np.array(times, np.float64)

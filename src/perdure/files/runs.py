@@ -1,4 +1,4 @@
-"""The run folder: `run.json`, `tracks.jsonl`, `tracks.txt`, `events.csv`, `tracked.mp4`."""
+"""The run folder: `run.json`, `tracks.jsonl`, `tracks.txt`, `events.csv`, `tracked.mp4`; `corrections.jsonl` by hand."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from typing import IO, Any
 
 from perdure import __version__
 from perdure.errors import FormatError, OutputError
+from perdure.files.corrections import NAME as CORRECTIONS
+from perdure.files.corrections import read_corrections
 from perdure.files.log import Entry, read_log
 from perdure.files.mot import write_rows
 from perdure.files.whole import cannot_write, whole_file
@@ -32,7 +34,7 @@ EVENT_COLUMNS = (
     "confidence",
     "why",
 )
-PARTS = ("run.json", "tracks.jsonl", "tracks.txt", "events.csv", "tracked.mp4")
+PARTS = ("run.json", "tracks.jsonl", "tracks.txt", "events.csv", "tracked.mp4", CORRECTIONS)
 _LEFTOVERS = {".DS_Store", *(f".{name}.part" for name in PARTS)}  # of a run that was killed
 
 
@@ -128,6 +130,11 @@ class RunFolder:
         return self.path / "tracks.jsonl"
 
     @property
+    def corrections(self) -> Path:
+        """The corrections by hand, which need not be there."""
+        return self.path / CORRECTIONS
+
+    @property
     def film(self) -> Path:
         """The drawn film."""
         return self.path / "tracked.mp4"
@@ -163,17 +170,29 @@ class RunFolder:
             )
         return about
 
+    def entries(self, *, with_masks: bool = True) -> Iterator[Entry]:
+        """Yield what was said: the entries of the log, then every correction by hand as an entry of frame -1.
+
+        Raises
+        ------
+        FormatError
+            Naming file and line, if one of both is damaged.
+        """
+        by_hand = read_corrections(self.corrections).in_force
+        yield from read_log(self.log, with_masks=with_masks)
+        yield from (Entry(-1, 0.0, one.report()) for one in by_hand)
+
     def settled_by_frame(self) -> Iterator[tuple[int, Tracks]]:
         """Yield (frame, settled rows), all statuses, groups too; memory stays bounded."""
-        return settle_by_frame(lambda: (entry.report for entry in read_log(self.log)))
+        return settle_by_frame(lambda: (entry.report for entry in self.entries()))
 
     def tracks(self) -> Tracks:
         """Return all settled rows at once."""
-        return settle(entry.report for entry in read_log(self.log))
+        return settle(entry.report for entry in self.entries())
 
     def read(self, *, with_masks: bool = True) -> tuple[Tracks, tuple[Event, ...], int]:
         """Return all settled rows, all events with their settled ids, and how many frames the log holds."""
-        entries = list(read_log(self.log, with_masks=with_masks))
+        entries = list(self.entries(with_masks=with_masks))
         reports = [entry.report for entry in entries]
         corrections = Corrections.of(reports)
         rows = settle(reports)
@@ -198,11 +217,11 @@ class RunFolder:
 
     def write_results(self, reporting: Reporting) -> Totals:
         """Settle the log into `tracks.txt` and `events.csv`, streaming."""
-        corrections = Corrections.of(entry.report for entry in read_log(self.log, with_masks=False))
+        corrections = Corrections.of(entry.report for entry in self.entries(with_masks=False))
         rows, ids, known = 0, set(), set()
         with whole_file(self.path / "events.csv") as events, whole_file(self.path / "tracks.txt") as tracks:
             table = _EventTable(events, corrections)
-            for _, settled in settle_with(corrections, table.passing(read_log(self.log, with_masks=False))):
+            for _, settled in settle_with(corrections, table.passing(self.entries(with_masks=False))):
                 known.update(settled.ids.tolist())
                 counted = settled.counted(reporting.report_confidence)
                 write_rows(tracks, counted)

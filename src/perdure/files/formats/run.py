@@ -9,7 +9,6 @@ from perdure import params
 from perdure.errors import FormatError, ParameterError
 from perdure.files.formats.content import Content, Format, Reading
 from perdure.files.formats.traits import ALL
-from perdure.files.log import read_log
 from perdure.files.runs import Reporting, RunFolder
 
 LOG = "tracks.jsonl"
@@ -40,7 +39,7 @@ def content_of(folder: RunFolder, about: dict[str, Any], report_confidence: floa
     return Content(
         folder.tracks().counted(report_confidence),
         size=(height, width) if are_known else None,
-        frames=tuple(entry.frame for entry in read_log(folder.log, with_masks=False) if entry.frame >= 0),
+        frames=tuple(entry.frame for entry in folder.entries(with_masks=False) if entry.frame >= 0),
         timed=True,
         name=Path(source).stem if isinstance(source, str) else folder.path.resolve().name,
     )
