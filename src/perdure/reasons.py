@@ -8,7 +8,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -134,7 +134,7 @@ def told(read: Callable[[], Iterable[Entry]], identity: int) -> Told:
             any_reasons = any_reasons or bool(entry.report.explanations)
             for one in entry.report.explanations:
                 if corrections.identity(one.id, entry.frame, number) == identity:
-                    reasons[entry.frame] = _reason(one, entry.frame, number, corrections)
+                    reasons[entry.frame] = reason_of(one, entry.frame, number, corrections)
             settled = (corrections.event(one, number) for one in entry.report.events)
             events.extend(one for one in settled if identity in one.ids)
             yield entry.report
@@ -157,13 +157,13 @@ def most_doubtful(read: Callable[[], Iterable[Entry]], most: int) -> list[tuple[
             for one in entry.report.explanations:
                 identity = corrections.identity(one.id, entry.frame, number)
                 if identity:
-                    yield identity, _reason(one, entry.frame, number, corrections)
+                    yield identity, reason_of(one, entry.frame, number, corrections)
 
     return heapq.nsmallest(most, every(), key=lambda one: (one[1].doubt, one[0]))
 
 
-def _reason(one: Explanation, frame: int, number: int, corrections: Corrections) -> Reason:
-    """The reason that an explanation of report `number` gives, with settled ids."""
+def reason_of(one: Explanation, frame: int, number: int, corrections: Corrections) -> Reason:
+    """Return the reason that an explanation of report `number` gives, with settled ids."""
     figures: dict[str, dict[str, float]] = {}
     for key, value in one.figures.items():
         kind, _, name = key.partition(":")
@@ -184,6 +184,28 @@ def _reason(one: Explanation, frame: int, number: int, corrections: Corrections)
     score = figures.get("score", {}).get("", 0.0)
     shares.sort(key=lambda part: -part.weight)
     return Reason(frame, one.why, score, tuple(shares), rival, rivals["other_region"])
+
+
+def as_value(one: Reason) -> dict[str, Any]:
+    """Return the reason of a link as plain values."""
+    rivals = (("runner_up", "id", one.runner_up), ("other_region", "region", one.other_region))
+    return {
+        "frame": one.frame,
+        "why": one.why,
+        "score": one.score,
+        "margin": None if one.margin is None else round(one.margin, 4),
+        "waned": round(one.waned, 4),
+        "features": {
+            part.feature: {
+                "link": part.link,
+                "global": part.whole,
+                "weight": part.weight,
+                "counts": round(part.counts, 4),
+            }
+            for part in one.shares
+        },
+        **{name: None if rival is None else {key: rival[0], "score": rival[1]} for name, key, rival in rivals},
+    }
 
 
 def _unseen(status: int, before: int | None, after: int | None) -> str:

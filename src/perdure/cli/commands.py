@@ -26,6 +26,7 @@ from perdure.cli.live import live
 from perdure.cli.scenarios import scenarios
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
+from perdure.cli.view import ViewCommand, view
 from perdure.cli.warmup import warmup
 from perdure.errors import DamagedVideo, PerdureError
 
@@ -73,6 +74,7 @@ for command in (
 app.command(cls=LearnCommand)(_interruptible(learn))
 app.command("learn-zones")(_interruptible(learn_zones))
 app.command(cls=ScoreCommand)(_interruptible(score))
+app.command(cls=ViewCommand)(_interruptible(view))
 
 
 def _print_version(wanted: bool) -> None:

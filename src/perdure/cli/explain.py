@@ -15,7 +15,7 @@ from perdure.cli import options
 from perdure.cli.tables import aligned
 from perdure.errors import ParameterError
 from perdure.files.runs import RunFolder
-from perdure.reasons import Reason, Told, most_doubtful, told
+from perdure.reasons import Reason, Told, as_value, most_doubtful, told
 from perdure.types import Event, Status
 
 LINK_COLUMNS = ["frame", "score", "margin", "runner-up", "other region", "least alike"]
@@ -88,7 +88,7 @@ def _overview(folder: RunFolder, most: int, *, as_json: bool) -> None:
     links = most_doubtful(lambda: folder.entries(with_masks=False), most)
     note = "" if links else _without_reasons(folder.read_about())
     if as_json:
-        value = {"run": str(folder.path), "note": note, "links": [{"id": one, **_link(why)} for one, why in links]}
+        value = {"run": str(folder.path), "note": note, "links": [{"id": one, **as_value(why)} for one, why in links]}
         print(json.dumps(value))
         return
     if not links:
@@ -193,7 +193,7 @@ def _value(
         "seen": int((~rows.inferred).sum()),
         "not_seen": int(rows.inferred.sum()),
         "note": note,
-        "links": [_link(one) for one in chosen],
+        "links": [as_value(one) for one in chosen],
         "events": [dataclasses.asdict(one) for one in events],
     }
     if frame is not None:
@@ -212,27 +212,6 @@ def _value(
             "remark": "" if frame in found.reasons else found.remark(frame),
         }
     return value
-
-
-def _link(one: Reason) -> dict[str, Any]:
-    rivals = (("runner_up", "id", one.runner_up), ("other_region", "region", one.other_region))
-    return {
-        "frame": one.frame,
-        "why": one.why,
-        "score": one.score,
-        "margin": None if one.margin is None else round(one.margin, 4),
-        "waned": round(one.waned, 4),
-        "features": {
-            part.feature: {
-                "link": part.link,
-                "global": part.whole,
-                "weight": part.weight,
-                "counts": round(part.counts, 4),
-            }
-            for part in one.shares
-        },
-        **{name: None if rival is None else {key: rival[0], "score": rival[1]} for name, key, rival in rivals},
-    }
 
 
 _SHOWN = 0.005  # of a score: what is less is rounded away

@@ -50,7 +50,8 @@ class Correction:
     begin, end : int
         First and last frame, both included; None for no end.
     event : (int, int) or None
-        The doubtful event that this settles: the number of its report in the log, and its number in that.
+        The doubtful event that this settles: the number of its report in the log, and its number in that; of what no
+        report names, -1 less the frame, and an id.
     """
 
     do: str
@@ -206,6 +207,10 @@ def _frame(value: Mapping[str, Json], name: str) -> int:
 def _event(value: Json) -> tuple[int, int] | None:
     if value is None:
         return None
-    if not (isinstance(value, list) and len(value) == 2 and all(type(one) is int and one >= 0 for one in value)):
+    if not (
+        isinstance(value, list)
+        and len(value) == 2
+        and all(type(one) is int and abs(one) <= OPEN_END for one in value)
+    ):
         raise ParameterError("an event is [number of its report, its number there]")
     return value[0], value[1]

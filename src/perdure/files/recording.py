@@ -60,6 +60,27 @@ class Recording:
         self.running.add(frames)
         return frames
 
+    def frames_towards(self, index: int) -> Generator[Frame, None, None]:
+        """Yield frames one after the other, from the key frame at or before `index` on, or from the first.
+
+        Raises
+        ------
+        DamagedVideo
+            At the first damage.
+        """
+        known = self.listing
+        key = known.key_before(index) if known is not None and known.exact and known.stamps else None
+        if known is None or key is None or key <= known.stamps[0] or not can_enter(self.path, key):
+            key = None
+        clock, upcoming = self._clock(), index
+        try:
+            for picture in decode(self.path, key=key, listing=known):
+                time = clock.time(picture.index, picture.seconds)
+                upcoming = picture.index + 1
+                yield Frame(picture.index, time, self._image(picture, time))
+        except Broken:
+            raise self._damaged(upcoming, clock.next_time) from None
+
     def sample(self, count: int) -> list[Frame]:
         """Return about `count` frames spread over the wanted part; damaged ones are left out.
 
