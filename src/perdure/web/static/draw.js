@@ -1,0 +1,274 @@
+// A frame and what is said of it, on a canvas: silhouettes, contours, boxes, trails, labels.
+//
+// How a row looks says how well it is known, as in the films: solid is seen; a dashed edge is the hidden side of who is
+// partly hidden; dashed and dim is hidden; short dashes are lost; dotted with a "?" is one of several in one silhouette;
+// corner brackets are round a group.
+
+import { colourOf, css, dimmer, readableOn } from "./colours.js";
+import { AMBIGUOUS, LOST, OCCLUDED, PARTLY } from "./rows.js";
+
+const DASHES = { [OCCLUDED]: [7, 5], [LOST]: [3, 7], [AMBIGUOUS]: [1.5, 4] };
+const SIDES = { left: 1, top: 2, right: 4, bottom: 8 };
+const TRAIL_SECONDS = 3;
+
+// `to` maps picture to screen: { scale, x, y }.
+export function paintRows(ctx, to, rows, { shapes, options, selected, partner, hovered }) {
+  const shown = rows.filter((row) => options.unseen || (row.status !== LOST && row.status !== OCCLUDED));
+  const raised = (row) => (row.id === selected || row.id === partner || row.id === hovered ? 1 : 0);
+  const order = [...shown].sort((a, b) => raised(a) - raised(b));
+  const muted = selected > 0;
+  if (options.shapes && shapes) for (const row of order) paintShape(ctx, to, row, shapes[row.id]);
+  for (const row of order) {
+    const lit = raised(row) > 0;
+    ctx.globalAlpha = muted && !lit ? 0.62 : 1;
+    if (options.boxes || lit) paintBox(ctx, to, row, lit, row.id === selected);
+  }
+  ctx.globalAlpha = 1;
+  const taken = [];
+  if (options.labels) for (const row of order.toReversed()) paintLabel(ctx, to, row, rows, raised(row) > 0, muted, taken);
+}
+
+function lookOf(row) {
+  const colour = colourOf(row.id);
+  return row.status === OCCLUDED || row.status === LOST ? dimmer(colour) : colour;
+}
+
+function paintBox(ctx, to, row, lit, chosen) {
+  const x1 = to.x + row.x1 * to.scale, y1 = to.y + row.y1 * to.scale;
+  const x2 = to.x + row.x2 * to.scale, y2 = to.y + row.y2 * to.scale;
+  const colour = css(lookOf(row));
+  const width = chosen ? 3 : lit ? 2.5 : row.status === LOST ? 1.25 : 1.75;
+  if (row.isGroup) return brackets(ctx, x1 - 3, y1 - 3, x2 + 3, y2 + 3, colour, width);
+  const dash = DASHES[row.status];
+  if (row.status === PARTLY && row.hidden) {
+    const edges = [["left", x1, y1, x1, y2], ["top", x1, y1, x2, y1], ["right", x2, y1, x2, y2], ["bottom", x1, y2, x2, y2]];
+    for (const [side, ax, ay, bx, by] of edges) {
+      stroke(ctx, [[ax, ay], [bx, by]], false, colour, width, row.hidden & SIDES[side] ? DASHES[OCCLUDED] : []);
+    }
+    return;
+  }
+  stroke(ctx, [[x1, y1], [x2, y1], [x2, y2], [x1, y2]], true, colour, width, dash ?? []);
+}
+
+function stroke(ctx, points, closed, colour, width, dash) {
+  ctx.beginPath();
+  points.forEach(([x, y], k) => (k ? ctx.lineTo(x, y) : ctx.moveTo(x, y)));
+  if (closed) ctx.closePath();
+  ctx.lineJoin = "round";
+  ctx.setLineDash(dash);
+  ctx.strokeStyle = "rgb(10 12 16 / .55)";
+  ctx.lineWidth = width + 2;
+  ctx.stroke();
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = width;
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+function brackets(ctx, x1, y1, x2, y2, colour, width) {
+  const reach = Math.min(14, (x2 - x1) / 3, (y2 - y1) / 3);
+  for (const [x, y, dx, dy] of [[x1, y1, 1, 1], [x2, y1, -1, 1], [x2, y2, -1, -1], [x1, y2, 1, -1]]) {
+    stroke(ctx, [[x + dx * reach, y], [x, y], [x, y + dy * reach]], false, colour, width, []);
+  }
+}
+
+const LETTERS = '700 12px system-ui, "Segoe UI", "DejaVu Sans", sans-serif';
+
+function paintLabel(ctx, to, row, rows, lit, muted, taken) {
+  if (row.isGroup && !lit) return;
+  const text = row.isGroup
+    ? `group ${rows.filter((one) => one.group === row.id).map((one) => one.id).join(" ")}`
+    : row.status === AMBIGUOUS ? `${row.id}?` : String(row.id);
+  ctx.font = LETTERS;
+  const wide = ctx.measureText(text).width + 10, high = 17;
+  const [x, y] = freePlace(to, row, wide, high, taken);
+  const colour = lookOf(row), dim = row.status === OCCLUDED || row.status === LOST;
+  ctx.globalAlpha = muted && !lit ? 0.6 : 1;
+  ctx.fillStyle = dim ? "rgb(20 23 29 / .85)" : css(colour);
+  ctx.beginPath();
+  ctx.roundRect(x, y, wide, high, 3);
+  ctx.fill();
+  ctx.fillStyle = dim ? css(colour) : readableOn(colour);
+  ctx.textBaseline = "middle";
+  ctx.fillText(text, x + 5, y + high / 2 + 0.5);
+  ctx.globalAlpha = 1;
+}
+
+// Above the box, below it, or a little aside, where no other label is.
+function freePlace(to, row, wide, high, taken) {
+  const left = to.x + row.x1 * to.scale, right = to.x + row.x2 * to.scale - wide;
+  const above = to.y + row.y1 * to.scale - high - 2, below = to.y + row.y2 * to.scale + 2;
+  const free = ([x, y]) => y >= to.top && y + high <= to.high && !taken.some(([a, b, c]) => x < a + c && a < x + wide && Math.abs(y - b) < high);
+  const tries = [[left, above], [right, above], [left, below], [right, below], [left, above - high - 2], [right + wide, above], [left - wide, above]];
+  const found = (tries.find(free) ?? [left, Math.max(to.top, above)]).map(Math.round);
+  taken.push([...found, wide]);
+  return found;
+}
+
+// Silhouettes ---------------------------------------------------------------------------------------------------
+
+const painted = new WeakMap(); // mask -> { id, canvas }
+
+function paintShape(ctx, to, row, shape) {
+  if (!shape) return;
+  if (shape.mask) paintMask(ctx, to, row, shape.mask, 0.34, 0.95);
+  if (shape.outline) return paintOutline(ctx, to, row, shape.outline);
+  if (shape.believed && row.status !== 0) paintMask(ctx, to, row, shape.believed, 0.1, 0.6);
+}
+
+function paintMask(ctx, to, row, mask, inside, edge) {
+  let found = painted.get(mask);
+  if (!found || found.id !== row.id) painted.set(mask, (found = { id: row.id, canvas: maskCanvas(mask, row.id, inside, edge) }));
+  if (!found.canvas) return;
+  const [high, wide] = mask.size;
+  ctx.drawImage(found.canvas, to.x + mask.x * to.scale, to.y + mask.y * to.scale, wide * to.scale, high * to.scale);
+}
+
+// Run lengths go column by column, empty and filled by turns.
+function maskCanvas(mask, id, inside, edge) {
+  const [high, wide] = mask.size;
+  if (!high || !wide) return null;
+  const bits = new Uint8Array(high * wide);
+  let place = 0, filled = 0;
+  for (const run of mask.runs) {
+    if (filled) bits.fill(1, place, place + run);
+    place += run;
+    filled = 1 - filled;
+  }
+  const image = new ImageData(wide, high), [red, green, blue] = colourOf(id);
+  for (let x = 0; x < wide; x++) {
+    for (let y = 0; y < high; y++) {
+      const k = x * high + y;
+      if (!bits[k]) continue;
+      const rim = !(y && bits[k - 1]) || !(y < high - 1 && bits[k + 1]) || !(x && bits[k - high]) || !(x < wide - 1 && bits[k + high]);
+      image.data.set([red, green, blue, 255 * (rim ? edge : inside)], 4 * (y * wide + x));
+    }
+  }
+  const canvas = new OffscreenCanvas(wide, high);
+  canvas.getContext("2d").putImageData(image, 0, 0);
+  return canvas;
+}
+
+function paintOutline(ctx, to, row, outline) {
+  ctx.beginPath();
+  for (const ring of outline.rings) {
+    let x = 0, y = 0;
+    for (let k = 0; k < ring.length; k += 2) {
+      x += ring[k] / outline.per_pixel;
+      y += ring[k + 1] / outline.per_pixel;
+      const sx = to.x + x * to.scale, sy = to.y + y * to.scale;
+      if (k) ctx.lineTo(sx, sy); else ctx.moveTo(sx, sy);
+    }
+    ctx.closePath();
+  }
+  ctx.setLineDash(row.status === OCCLUDED ? [6, 5] : []);
+  ctx.strokeStyle = css(lookOf(row));
+  ctx.lineWidth = 1.75;
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+// Trails --------------------------------------------------------------------------------------------------------
+
+// Where everybody's feet were in the last seconds; `rowsAt` gives rows by place in `frames`.
+export function paintTrails(ctx, to, layer, frames, times, at, only) {
+  const points = new Map();
+  for (let k = at; k >= 0 && times[at] - times[k] <= TRAIL_SECONDS; k--) {
+    if (!layer.ready(frames[k])) break;
+    for (const row of layer.rowsAt(frames[k])) {
+      if (row.status === LOST || row.isGroup || (only && !only.has(row.id))) continue;
+      if (!points.has(row.id)) points.set(row.id, []);
+      points.get(row.id).push([(row.x1 + row.x2) / 2, row.y2, k, row.y2 - row.y1]);
+    }
+  }
+  ctx.lineCap = "round";
+  for (const [id, line] of points) {
+    const now = line[0][2];
+    if (at - now > 1) continue;
+    for (let k = 1; k < line.length; k++) {
+      const [ax, ay, a, tall] = line[k - 1], [bx, by, b] = line[k];
+      if (a - b > 3 || Math.hypot(ax - bx, ay - by) > tall) continue; // no movement, but another box
+      const age = (times[at] - times[b]) / TRAIL_SECONDS;
+      ctx.strokeStyle = css(colourOf(id), 0.85 * (1 - age) + 0.05);
+      ctx.lineWidth = 2.2 * (1 - 0.5 * age);
+      ctx.beginPath();
+      ctx.moveTo(to.x + ax * to.scale, to.y + ay * to.scale);
+      ctx.lineTo(to.x + bx * to.scale, to.y + by * to.scale);
+      ctx.stroke();
+    }
+  }
+  ctx.lineCap = "butt";
+}
+
+// Zones and ground ----------------------------------------------------------------------------------------------
+
+export const ZONE_COLOURS = {
+  entry: [95, 192, 139], exit: [240, 140, 90], occlusion: [150, 130, 240], "low-contrast": [210, 190, 90],
+  noise: [200, 110, 180], ignore: [150, 158, 170], ground: [90, 180, 220],
+};
+
+export function paintZone(ctx, to, zone, chosen, open) {
+  const colour = ZONE_COLOURS[zone.kind] ?? [200, 200, 200];
+  ctx.beginPath();
+  for (const ring of zone.rings) {
+    ring.forEach(([x, y], k) => {
+      const sx = to.x + x * to.scale, sy = to.y + y * to.scale;
+      if (k) ctx.lineTo(sx, sy); else ctx.moveTo(sx, sy);
+    });
+    if (!open) ctx.closePath();
+  }
+  if (!open) {
+    ctx.fillStyle = css(colour, chosen ? 0.28 : 0.14);
+    ctx.fill("evenodd");
+  }
+  ctx.setLineDash(zone.kind === "occlusion" ? [6, 4] : []);
+  ctx.strokeStyle = "rgb(10 12 16 / .6)";
+  ctx.lineWidth = chosen ? 4.5 : 3.5;
+  ctx.stroke();
+  ctx.strokeStyle = css(colour);
+  ctx.lineWidth = chosen ? 2.5 : 1.5;
+  ctx.stroke();
+  ctx.setLineDash([]);
+  if (chosen || open) for (const ring of zone.rings) for (const point of ring) paintKnob(ctx, to, point, css(colour));
+  if (!open && zone.name) {
+    const [x, y] = zone.rings[0].reduce(([a, b], [c, d]) => (d < b ? [c, d] : [a, b]));
+    paintWords(ctx, to.x + x * to.scale, to.y + y * to.scale + 12, zone.name, css(colour));
+  }
+}
+
+export function paintKnob(ctx, to, [x, y], colour, name = "") {
+  const sx = to.x + x * to.scale, sy = to.y + y * to.scale;
+  ctx.beginPath();
+  ctx.arc(sx, sy, 5, 0, 2 * Math.PI);
+  ctx.fillStyle = colour;
+  ctx.fill();
+  ctx.lineWidth = 2;
+  ctx.strokeStyle = "rgb(10 12 16 / .85)";
+  ctx.stroke();
+  if (name) paintWords(ctx, sx + 16, sy - 10, name, colour);
+}
+
+export function paintWords(ctx, x, y, text, colour) {
+  ctx.font = LETTERS;
+  const wide = ctx.measureText(text).width + 10;
+  ctx.fillStyle = "rgb(14 16 20 / .8)";
+  ctx.beginPath();
+  ctx.roundRect(x - wide / 2, y - 9, wide, 18, 4);
+  ctx.fill();
+  ctx.fillStyle = colour;
+  ctx.textBaseline = "middle";
+  ctx.fillText(text, x - wide / 2 + 5, y + 0.5);
+}
+
+export function paintGrid(ctx, to, lines) {
+  ctx.strokeStyle = "rgb(120 200 235 / .75)";
+  ctx.lineWidth = 1;
+  for (const line of lines) {
+    ctx.beginPath();
+    line.forEach(([x, y], k) => {
+      const sx = to.x + x * to.scale, sy = to.y + y * to.scale;
+      if (k) ctx.lineTo(sx, sy); else ctx.moveTo(sx, sy);
+    });
+    ctx.stroke();
+  }
+}
