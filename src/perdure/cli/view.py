@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import socket
 import sys
@@ -106,9 +107,11 @@ def view(
         access_log=False,
         server_header=False,
         lifespan="on",
+        ws="none",
         timeout_graceful_shutdown=2,
     )
-    uvicorn.Server(settings).run([listening])
+    with contextlib.suppress(KeyboardInterrupt):  # the usual end
+        uvicorn.Server(settings).run([listening])
 
 
 def _folder(path: Path) -> Path:

@@ -26,6 +26,7 @@ from typing import Any, TypeVar
 import anyio
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
@@ -60,7 +61,7 @@ def application(shown: Shown, token: str) -> App:
     pages = _Pages(shown, token, _static())
     app = Starlette(
         routes=pages.routes(),
-        exception_handlers={PerdureError: _mistake, ParameterError: _mistake},
+        exception_handlers={PerdureError: _mistake, HTTPException: _refused},
         lifespan=pages.lifespan,
     )
     return Guard(GZipMiddleware(app, minimum_size=2048, compresslevel=1), token)
@@ -69,6 +70,13 @@ def application(shown: Shown, token: str) -> App:
 async def _mistake(request: Request, error: Exception) -> Response:
     """The caller's mistake, in words."""
     return JSONResponse({"error": str(error)}, 422)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    """What is not there, or may not be."""
+    status = error.status_code if isinstance(error, HTTPException) else 500
+    words = error.detail if isinstance(error, HTTPException) else ""
+    return JSONResponse({"error": words}, status)
 
 
 def _static() -> dict[str, tuple[bytes, str]]:

@@ -7,9 +7,11 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
 from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 
 LARGEST_BODY = 1 << 20  # bytes
+_TOO_LARGE = f"a request may have {LARGEST_BODY >> 20} MiB at most"
 _LONGEST_PATH = 2048
 TOKEN = "x-perdure-token"
 _READS = ("GET", "HEAD")
@@ -30,10 +32,6 @@ _HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"referrer-policy", b"no-referrer"),
 )
-
-
-class TooLarge(Exception):
-    """A body without a declared length turned out too large."""
 
 
 class Guard:
@@ -59,23 +57,16 @@ class Guard:
                 await self._app(scope, receive, send)
             return
         refusal = self._refusal(scope, Headers(scope=scope))
-        started = False
 
         async def sent(message: Message) -> None:
-            nonlocal started
             if message["type"] == "http.response.start":
-                started = True
                 message["headers"] = [*message.get("headers", ()), *_HEADERS]
             await send(message)
 
         if refusal is not None:
             await refusal(scope, receive, sent)
             return
-        try:
-            await self._app(scope, _limited(receive), sent)
-        except TooLarge:
-            if not started:
-                await _refused(413, f"more than {LARGEST_BODY >> 20} MiB")(scope, receive, sent)
+        await self._app(scope, _limited(receive), sent)
 
     def _refusal(self, scope: Scope, headers: Headers) -> JSONResponse | None:
         host = headers.get("host", "")
@@ -85,7 +76,7 @@ class Guard:
             return _refused(414, "the address is too long")
         length = headers.get("content-length", "0")
         if not length.isdigit() or len(length) > 12 or int(length) > LARGEST_BODY:
-            return _refused(413, f"more than {LARGEST_BODY >> 20} MiB")
+            return _refused(413, _TOO_LARGE)
         if scope["method"] in _READS:
             return None
         if not hmac.compare_digest(headers.get(TOKEN, "").encode(), self._token):
@@ -106,7 +97,7 @@ def _refused(status: int, why: str) -> JSONResponse:
 
 
 def _limited(receive: Receive) -> Receive:
-    """`receive`, which raises TooLarge where the pieces of a body sum up to more than may be."""
+    """`receive`, which raises a 413 where the pieces of a body sum up to more than may be."""
     got = 0
 
     async def limited() -> Message:
@@ -115,7 +106,7 @@ def _limited(receive: Receive) -> Receive:
         if message["type"] == "http.request":
             got += len(message.get("body", b""))
             if got > LARGEST_BODY:
-                raise TooLarge
+                raise HTTPException(413, _TOO_LARGE)
         return message
 
     return limited

@@ -24,6 +24,7 @@ from perdure.types import Dropped, Event, Explanation, Renamed, Status
 
 _SHAPES = re.compile(rb',"(?:mask|believed|outline)":\{[^{}]*\}')
 _STATUS = {one.word: int(one) for one in Status}
+_TAIL = 256  # bytes
 _LARGEST = 2**53  # of a whole number that a browser holds exactly
 SIDES = {"left": 1, "top": 2, "right": 4, "bottom": 8}
 Json = Any
@@ -96,7 +97,7 @@ class Ledger:
     explains: bool = False  # whether any link is explained
     _at: int = 0  # bytes that were read
     _lines: int = 0
-    _inode: int = 0
+    _tail: bytes = b""  # the end of what was read: a log that was replaced has another there
     _rows: dict[str, array[Any]] = field(default_factory=dict)
 
     def refresh(self, seconds: float = 1e9) -> bool:
@@ -105,9 +106,8 @@ class Ledger:
         A log that was replaced by another is read from its beginning.
         """
         try:
-            about = self.path.stat()
-            if about.st_ino != self._inode or about.st_size < self._at:
-                self._begin(about.st_ino)
+            if not self._rows or not self._stands():
+                self._begin()
             return self._read_on(time.monotonic() + seconds)
         except OSError as error:
             self.complete = True
@@ -139,12 +139,18 @@ class Ledger:
         except (KeyError, TypeError, ValueError) as error:
             raise FormatError(f"{self.path}: the reasons of report {number} are damaged ({error})") from error
 
-    def _begin(self, inode: int) -> None:
+    def _stands(self) -> bool:
+        """Whether what was read is still there."""
+        with self.path.open("rb") as file:
+            file.seek(self._at - len(self._tail))
+            return file.read(len(self._tail)) == self._tail
+
+    def _begin(self) -> None:
         """Forget everything: another file."""
         version = self.version + 1
         fresh = Ledger(self.path)
         self.__dict__.update(fresh.__dict__)
-        self.version, self._inode = version, inode
+        self.version = version
         self._rows = {name: array(code) for name, code in _CODES.items()}
 
     def _fail(self, why: str) -> bool:
@@ -168,6 +174,7 @@ class Ledger:
                     self.complete = True
                     return self._fail(str(error))
                 self._at += len(raw)
+                self._tail = raw[-_TAIL:]
                 if time.monotonic() > until:
                     self.complete, self.version = False, self.version + 1
                     return True
