@@ -27,7 +27,7 @@ CROSSING = 20  # frame in which the tracker exchanges 1 and 2
 
 def true_boxes(k: int) -> dict[int, tuple[int, int, int, int]]:
     """Two who walk towards each other and past, and one who stands."""
-    return {1: (10 + 3 * k, 40, 24 + 3 * k, 80), 2: (130 - 3 * k, 44, 144 - 3 * k, 84), 3: (70, 4, 80, 30)}
+    return {1: (10 + 3 * k, 40, 24 + 3 * k, 80), 2: (130 - 3 * k, 44, 144 - 3 * k, 84), 3: (70, 10, 80, 36)}
 
 
 def said_ids(k: int) -> dict[int, int]:
@@ -206,6 +206,7 @@ def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
     def opened(viewer: Viewer, address: str | None = None, **options: Any) -> Any:
         context = browser.new_context(viewport={"width": 1280, "height": 720}, **options)
         contexts.append(context)
+        context.set_default_timeout(6000)
         page = context.new_page()
         page.on("pageerror", lambda error: wrongs.append(str(error)))
         page.on("console", lambda told: wrongs.append(told.text) if told.type == "error" else None)

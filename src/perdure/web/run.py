@@ -70,7 +70,7 @@ class OpenRun:
             fps=rate if isinstance(rate, (int, float)) else None,
             size=self.size,
         )
-        self._lock = threading.RLock()
+        self._lock, self._writing = threading.RLock(), threading.Lock()
         self._history, self._history_wrong = History(), ""
         self._edition, self._seen = 0, (-1, History())
         self._made = _Made()
@@ -252,16 +252,19 @@ class OpenRun:
 
     def save(self) -> None:
         """Write `tracks.txt` and `events.csv` anew, if corrections have changed them."""
-        with self._lock:
-            waiting, self._unsaved = self._unsaved, None
-        if waiting is None:
-            return
-        waiting.cancel()
-        try:
-            self.folder.write_results(Reporting(self.report_confidence()))
-            self._wrong_results = ""
-        except PerdureError as error:
-            self._wrong_results = str(error)
+        with self._writing:
+            waiting = self._unsaved
+            if waiting is None:
+                return
+            waiting.cancel()
+            try:
+                self.folder.write_results(Reporting(self.report_confidence()))
+                self._wrong_results = ""
+            except PerdureError as error:
+                self._wrong_results = str(error)
+            with self._lock:
+                if self._unsaved is waiting:  # nothing was corrected meanwhile
+                    self._unsaved = None
 
     def close(self) -> None:
         """Write what is to be written, and give back files and threads."""

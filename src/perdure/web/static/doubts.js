@@ -27,7 +27,7 @@ export function choose(one) {
 // The next or previous doubt that nobody has looked at; round the corner at the ends.
 export function step(by) {
   const open = (state.events?.doubts ?? []).filter((one) => one.doubtful && (!one.looked || one === state.doubt));
-  if (!open.length) return set({ doubt: null });
+  if (!open.some((one) => !one.looked)) return set({ doubt: null });
   const place = open.indexOf(state.doubt);
   return choose(open[place < 0 ? (by > 0 ? 0 : open.length - 1) : (place + by + open.length) % open.length]);
 }

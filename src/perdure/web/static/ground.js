@@ -84,18 +84,25 @@ async function say(method) {
 export function draw() {
   const { ground } = state;
   if (!ground) return void put(byId("panel"), h("div", { class: "empty" }, "Reading the ground plane…"));
-  const whole = ground.points.length === 4, known = ground.lengths.filter((one) => Number(one) > 0).length;
+  const whole = ground.points.length === 4;
   put(byId("panel"),
     h("div", { class: "toolbar" },
-      h("button", { class: "primary", disabled: !whole || known < 5 || !state.session.writable, onclick: () => say("POST") }, "Show the grid"),
-      h("button", { disabled: !tried || !state.session.writable, onclick: () => say("PUT") }, "Save"), h("span", { class: "spring" }),
+      h("button", { id: "try-ground", class: "primary", onclick: () => say("POST") }, "Show the grid"),
+      h("button", { id: "save-ground", onclick: () => say("PUT") }, "Save"), h("span", { class: "spring" }),
       h("button", { disabled: !ground.points.length, onclick: () => { ground.points = []; moved(); draw(); } }, "Clear")),
     h("div", { class: "form" }, h("div", { class: "problem", role: "alert" }, problem), saved && h("p", { class: "saved", role: "status" }, saved),
       h("p", {}, whole ? "How far apart are they, in metres? Five of the six will do; the sixth checks them." : `Click four points on the ground, round a large quadrangle: ${["A", "B", "C", "D"][ground.points.length]} is next.`),
       ground.grid.length > 0 && h("p", {}, `The grid has a line every ${ground.step} m. It should lie on the ground like paving.`),
       whole && PAIRS.map(([a, b], k) => {
         const field = h("input", { type: "number", id: `length-${k}`, min: 0, step: "any", value: ground.lengths[k], placeholder: "metres" });
-        field.addEventListener("change", () => { ground.lengths[k] = field.value; tried = false; draw(); byId(`length-${Math.min(5, k + 1)}`)?.focus(); });
+        field.addEventListener("input", () => { ground.lengths[k] = field.value; tried = false; enable(); });
         return h("div", { class: "field" }, h("label", { for: `length-${k}` }, `${"ABCD"[a]} to ${"ABCD"[b]}`), field);
       })));
+  enable();
+}
+
+function enable() {
+  const known = state.ground.lengths.filter((one) => Number(one) > 0).length, { writable } = state.session;
+  byId("try-ground").disabled = state.ground.points.length < 4 || known < 5 || !writable;
+  byId("save-ground").disabled = !tried || !writable;
 }

@@ -15,7 +15,13 @@ const WORDS = {
   confirm: () => "Marked as right",
 };
 
-async function correct(value, { quiet = false } = {}) {
+// One after the other, so that an undo undoes what was asked for before it.
+let before = Promise.resolve();
+function correct(value, options) {
+  return (before = before.then(() => corrected(value, options)));
+}
+
+async function corrected(value, { quiet = false } = {}) {
   if (!state.session.writable) {
     toast("To correct, open the address that `perdure view` printed: it holds the token.", { bad: true });
     return null;
@@ -49,6 +55,7 @@ export const remove = (one, span = {}, about = settles([one])) => correct({ do: 
 export const confirm = (doubt) => correct({ do: "confirm", ids: doubt.ids, begin: doubt.begin, event: doubt.key }, { quiet: true });
 
 export async function undo() {
+  await before;
   if (!state.standing?.undo) return toast("There is nothing to undo");
   const what = state.standing.undo;
   if (await correct({ do: "undo" })) toast(`Undone: ${what}`);
@@ -56,6 +63,7 @@ export async function undo() {
 }
 
 export async function redo() {
+  await before;
   if (!state.standing?.redo) return toast("There is nothing to do again");
   const what = state.standing.redo;
   if (await correct({ do: "redo" })) toast(`Done again: ${what}`);

@@ -16,7 +16,7 @@ export class Stage {
     this.tool = null; // { press(point, event), drag(point), lift(), double(point), hover(point), cursor }
     this._due = false;
     new ResizeObserver(() => this.redraw()).observe(byId("stage"));
-    on("at selected partner hovered boxes shapes trails labels unseen zones ground tab follow", () => this.redraw());
+    on("events at selected partner hovered boxes shapes trails labels unseen zones ground tab follow", () => this.redraw());
     this.rebuild();
   }
 
@@ -87,7 +87,7 @@ export class Stage {
     this._overlay(ctx, to, view, rows, frame);
     view.shownFrame = frame;
     canvas.dataset.frame = frame;
-    canvas.dataset.rows = ready ? rows.length : "";
+    canvas.dataset.rows = ready && state.standing && state.events ? rows.length : "";
   }
 
   _overlay(ctx, to, view, rows, frame) {

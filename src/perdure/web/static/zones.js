@@ -55,6 +55,15 @@ function changed() {
   touch("zones");
 }
 
+// While somebody types the form stays as it is: a button that is replaced under the pointer is not clicked.
+function typed() {
+  state.zones.dirty = true;
+  byId("save-zones").disabled = !mayBeSaved();
+  stage.redraw();
+}
+
+const mayBeSaved = () => state.zones.dirty && state.session.writable && !state.zones.drawing && state.zones.list.length > 0;
+
 const within = ({ x, y }) => [Math.min(state.about.width, Math.max(0, x)), Math.min(state.about.height, Math.max(0, y))];
 let held = null;
 const tool = {
@@ -157,7 +166,7 @@ export function draw() {
         ? [h("button", { class: "primary", onclick: finish }, "Close it", h("kbd", {}, "Enter")), h("button", { onclick: cancel }, "Give up", h("kbd", {}, "Esc"))]
         : h("button", { class: "primary", onclick: start }, "Draw a zone"),
       h("span", { class: "spring" }),
-      h("button", { onclick: save, disabled: !zones.dirty || !state.session.writable || Boolean(drawing) || !zones.list.length }, "Save")),
+      h("button", { id: "save-zones", onclick: save, disabled: !mayBeSaved() }, "Save")),
     h("div", { class: "form" }, h("div", { class: "problem", role: "alert" }, problem), saved && h("p", { class: "saved", role: "status" }, saved),
       drawing && h("p", {}, "Click its corners in the film; click the first one again, or double-click, to close it."),
       !drawing && !zones.list.length && h("p", {}, "Zones tell a tracker where people come in and go out, what hides them, and where nothing counts. Draw the first one.")),
@@ -173,19 +182,22 @@ function item(zone, current) {
 function form(zone) {
   const settings = state.session.zone_kinds[zone.kind];
   const kind = h("select", { id: "zone-kind", onchange: () => { zone.kind = kind.value; changed(); } }, Object.keys(KIND_WORDS).map((one) => h("option", { value: one, selected: one === zone.kind }, `${one}: ${KIND_WORDS[one]}`)));
-  const name = h("input", { type: "text", id: "zone-name", value: zone.name, maxlength: 80, onchange: () => { zone.name = name.value.trim(); changed(); } });
-  const rename = () => {
-    for (const rule of state.zones.rules) for (const end of ["lost_in", "found_in"]) if (rule[end] === zone.name) rule[end] = name.value.trim();
-  };
-  name.addEventListener("change", rename, { capture: true });
+  const name = h("input", { type: "text", id: "zone-name", value: zone.name, maxlength: 80 });
+  name.addEventListener("input", () => {
+    const before = zone.name;
+    zone.name = name.value.trim();
+    for (const rule of state.zones.rules) for (const end of ["lost_in", "found_in"]) if (rule[end] === before) rule[end] = zone.name;
+    byId("panel").querySelector('.item[aria-current="true"] .kind').textContent = zone.name;
+    typed();
+  });
   return h("div", { class: "form" },
     h("div", { class: "field" }, h("label", { for: "zone-name" }, "Name"), name),
     h("div", { class: "field" }, h("label", { for: "zone-kind" }, "Kind"), kind),
     Object.entries(settings).map(([word, about]) => {
       const field = h("input", { type: "number", id: `zone-${word}`, step: "any", min: about.low, max: about.high, placeholder: String(about.default), value: zone.settings[word] ?? "" });
-      field.addEventListener("change", () => {
+      field.addEventListener("input", () => {
         if (field.value === "") delete zone.settings[word]; else zone.settings[word] = Number(field.value);
-        changed();
+        typed();
       });
       return h("div", { class: "field" }, h("label", { for: `zone-${word}` }, word), field, h("span", { class: "hint" }, about.help));
     }),
