@@ -60,8 +60,8 @@ class Recording:
         self.running.add(frames)
         return frames
 
-    def frames_towards(self, index: int) -> Generator[Frame, None, None]:
-        """Yield frames one after the other, from the key frame at or before `index` on, or from the first.
+    def frames_towards(self, index: int, near: int) -> Generator[Frame, None, None]:
+        """Yield frames one after the other, from `near` before `index` on, as far as the way from a key frame goes by there.
 
         Raises
         ------
@@ -77,7 +77,8 @@ class Recording:
             for picture in decode(self.path, key=key, listing=known):
                 time = clock.time(picture.index, picture.seconds)
                 upcoming = picture.index + 1
-                yield Frame(picture.index, time, self._image(picture, time))
+                if picture.index >= index - near:
+                    yield Frame(picture.index, time, self._image(picture, time))
         except Broken:
             raise self._damaged(upcoming, clock.next_time) from None
 

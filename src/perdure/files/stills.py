@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from bisect import bisect_left
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from typing import Any
@@ -14,6 +15,7 @@ from perdure.files.span import Moment, Span
 from perdure.files.video import open_source
 from perdure.types import Frame
 
+_KEPT = 12  # frames before one asked for that are passed to `seen` on the way: somebody steps back
 _NEAR = 64  # frames: so far ahead it is quicker to go on than to enter anew
 
 
@@ -21,7 +23,7 @@ class Stills:
     """The frames of a source that can be read again, each by its number in the whole source.
 
     Not for several threads at once. A frame asked for costs the way from the key frame before it, or from the last
-    frame asked for; what is decoded on the way is passed to `seen`, so that it may be kept.
+    frame asked for; the last ones on the way are passed to `seen`, so that they may be kept.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ class Stills:
     fps : float or None
         As the run was given it; times are not used.
     seen : function of a frame
-        Told every frame that is decoded.
+        Told the frame asked for, and some before it.
 
     Raises
     ------
@@ -74,6 +76,16 @@ class Stills:
         self._leave()
         raise VideoError(f"{self._source.name} has no frame {index}")
 
+    def near(self, index: int) -> int:
+        """Return the number of a frame at or before one that can be had at once: of a video, a key frame's."""
+        if not isinstance(self._source, Recording) or 0 <= self._next <= index <= self._next + _KEPT:
+            return index
+        listing = self._source.listing
+        if listing is None or not listing.exact or not listing.keys:
+            return index
+        key = bisect_left(listing.stamps, listing.key_before(index))
+        return index if index - key <= _KEPT else key
+
     def close(self) -> None:
         """Give back files and threads."""
         self._leave()
@@ -90,7 +102,7 @@ class Stills:
             listing = self._source.listing
             if listing is not None and listing.exact and index >= len(listing.stamps):
                 raise VideoError(f"{self._source.name} has no frame {index}; it has {len(listing.stamps)}")
-            self._running = self._source.frames_towards(index)
+            self._running = self._source.frames_towards(index, _KEPT)
             self._next = index
         else:
             raise VideoError(f"{self._source.name} cannot be read by the numbers of its frames")

@@ -4,7 +4,7 @@
     GET  /static/NAME                        its parts, those of this package and no others
     GET  /api/session                        the runs, what is known of them, and whether this caller may write
     GET  /api/runs/N/state|frames|tracks|events|rows|shapes|explain|zones|calibration
-    GET  /api/runs/N/pictures/K.jpg          frame K of the source
+    GET  /api/runs/N/pictures/K.jpg          frame K of the source; with ?near, one before it that is had at once
     GET  /api/runs/N/truth/tracks|rows|score
     POST /api/runs/N/corrections             a correction, "undo" or "redo"
     PUT  /api/runs/N/zones|calibration       POST …/calibration only checks
@@ -152,6 +152,7 @@ class _Pages:
         async with anyio.create_task_group() as tasks:
             for run in self._shown.runs:
                 tasks.start_soon(_read_ahead, run)
+                tasks.start_soon(run_in_threadpool, run.pictures.why_not)
             yield
             tasks.cancel_scope.cancel()
         for run in self._shown.runs:
@@ -194,9 +195,14 @@ class _Pages:
         return JSONResponse(await run_in_threadpool(self._run(request).explain, identity, frame))
 
     async def picture(self, request: Request) -> Response:
-        """A frame of the source; of those who wait, one who has gone away is not decoded for."""
+        """A frame of the source, or with `?near` one before it that can be had at once; `X-Frame` says which.
+
+        Of those who wait, one who has gone away is not decoded for.
+        """
         n, index = request.path_params["n"], request.path_params["k"]
-        pictures = self._run(request).pictures
+        pictures, near = self._run(request).pictures, "near" in request.query_params
+        if near:
+            index = await run_in_threadpool(pictures.near, index)
         found = pictures.kept(index)
         if found is None:
             async with self._decoding.setdefault(n, anyio.Lock()):
@@ -206,7 +212,8 @@ class _Pages:
                     found = await run_in_threadpool(pictures.jpeg, index)
                 except PerdureError as error:
                     return JSONResponse({"error": str(error)}, 404)
-        return Response(found, media_type="image/jpeg", headers={"cache-control": "private, max-age=600"})
+        kept = "no-store" if near else "private, max-age=600"
+        return Response(found, media_type="image/jpeg", headers={"cache-control": kept, "x-frame": str(index)})
 
     async def truth_tracks(self, request: Request) -> Response:
         """Where the objects of the truth are."""

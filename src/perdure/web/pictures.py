@@ -51,6 +51,18 @@ class Pictures:
         """Return a frame's JPEG if it is at hand."""
         return self._jpegs.get(index)
 
+    def near(self, index: int) -> int:
+        """Return the number of a frame near one that can be had at once: one at hand, or a key frame."""
+        with self._lock:
+            if index in self._jpegs or index in self._decoded:
+                return index
+            stills = self._open()
+            if stills is None:
+                return index
+            key = stills.near(index)
+            at_hand = [one for one in (*self._jpegs, *self._decoded) if key <= one <= index]
+            return max(at_hand, default=key)
+
     def jpeg(self, index: int) -> bytes:
         """Return a frame as JPEG.
 

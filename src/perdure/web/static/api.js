@@ -26,5 +26,9 @@ async function answered(path, options = {}) {
 export const ask = async (path, options) => (await answered(path, options)).json();
 export const bytes = async (path, options) => (await answered(path, options)).arrayBuffer();
 export const blob = async (path, options) => (await answered(path, options)).blob();
+export async function roughly(path) {
+  const answer = await answered(path);
+  return [await answer.blob(), Number(answer.headers.get("x-frame"))];
+}
 export const send = (method, path, value) =>
   ask(path, { method, headers: { "content-type": "application/json" }, body: JSON.stringify(value) });

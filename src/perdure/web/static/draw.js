@@ -9,7 +9,7 @@ import { AMBIGUOUS, LOST, OCCLUDED, PARTLY } from "./rows.js";
 
 const DASHES = { [OCCLUDED]: [7, 5], [LOST]: [3, 7], [AMBIGUOUS]: [1.5, 4] };
 const SIDES = { left: 1, top: 2, right: 4, bottom: 8 };
-const TRAIL_SECONDS = 3;
+const TRAIL_SECONDS = 3, PIECES = 6;
 
 // `to` maps picture to screen: { scale, x, y }.
 export function paintRows(ctx, to, rows, { shapes, options, selected, partner, hovered }) {
@@ -17,7 +17,10 @@ export function paintRows(ctx, to, rows, { shapes, options, selected, partner, h
   const raised = (row) => (row.id === selected || row.id === partner || row.id === hovered ? 1 : 0);
   const order = [...shown].sort((a, b) => raised(a) - raised(b));
   const muted = selected > 0;
-  if (options.shapes && shapes) for (const row of order) paintShape(ctx, to, row, shapes[row.id]);
+  if (options.shapes && shapes) {
+    const sheet = sheetOf(shapes);
+    for (const row of order) paintShape(ctx, to, row, shapes[row.id], sheet);
+  }
   for (const row of order) {
     const lit = raised(row) > 0;
     ctx.globalAlpha = muted && !lit ? 0.62 : 1;
@@ -107,46 +110,72 @@ function freePlace(to, row, wide, high, taken) {
 
 // Silhouettes ---------------------------------------------------------------------------------------------------
 
-const painted = new WeakMap(); // mask -> { id, canvas }
+// All silhouettes of a frame are painted once into one sheet, and cut out of it from then on.
+const sheets = new WeakMap(); // shapes of a frame -> Map of mask -> { canvas, x, y }
 
-function paintShape(ctx, to, row, shape) {
+function paintShape(ctx, to, row, shape, sheet) {
   if (!shape) return;
-  if (shape.mask) paintMask(ctx, to, row, shape.mask, 0.34, 0.95);
+  if (shape.mask) paintMask(ctx, to, shape.mask, sheet);
   if (shape.outline) return paintOutline(ctx, to, row, shape.outline);
-  if (shape.believed && row.status !== 0) paintMask(ctx, to, row, shape.believed, 0.1, 0.6);
+  if (shape.believed && row.status !== 0) paintMask(ctx, to, shape.believed, sheet);
 }
 
-function paintMask(ctx, to, row, mask, inside, edge) {
-  let found = painted.get(mask);
-  if (!found || found.id !== row.id) painted.set(mask, (found = { id: row.id, canvas: maskCanvas(mask, row.id, inside, edge) }));
-  if (!found.canvas) return;
-  const [high, wide] = mask.size;
-  ctx.drawImage(found.canvas, to.x + mask.x * to.scale, to.y + mask.y * to.scale, wide * to.scale, high * to.scale);
+function paintMask(ctx, to, mask, sheet) {
+  const place = sheet.get(mask), [high, wide] = mask.size;
+  if (!place) return;
+  ctx.drawImage(place.canvas, place.x, place.y, wide, high, to.x + mask.x * to.scale, to.y + mask.y * to.scale, wide * to.scale, high * to.scale);
+}
+
+function sheetOf(shapes) {
+  let found = sheets.get(shapes);
+  if (!found) sheets.set(shapes, (found = madeSheet(shapes)));
+  return found;
+}
+
+function madeSheet(shapes) {
+  const parts = [];
+  for (const [id, { mask, believed }] of Object.entries(shapes)) {
+    if (mask) parts.push({ id: Number(id), mask, inside: 0.34, edge: 0.95 });
+    if (believed) parts.push({ id: Number(id), mask: believed, inside: 0.1, edge: 0.6 });
+  }
+  const wide = Math.max(512, ...parts.map(({ mask }) => mask.size[1])), found = new Map();
+  let x = 0, y = 0, row = 0;
+  for (const part of parts.sort((a, b) => a.mask.size[0] - b.mask.size[0])) {
+    const [tall, broad] = part.mask.size;
+    if (x + broad > wide) [x, y, row] = [0, y + row, 0];
+    Object.assign(part, { x, y });
+    x += broad;
+    row = Math.max(row, tall);
+  }
+  const high = y + row;
+  if (!high || high > 16384) return found;
+  const canvas = new OffscreenCanvas(wide, high), image = new ImageData(wide, high), pixels = new Uint32Array(image.data.buffer);
+  for (const part of parts) {
+    fill(pixels, wide, part);
+    found.set(part.mask, { canvas, x: part.x, y: part.y });
+  }
+  canvas.getContext("2d").putImageData(image, 0, 0);
+  return found;
 }
 
 // Run lengths go column by column, empty and filled by turns.
-function maskCanvas(mask, id, inside, edge) {
-  const [high, wide] = mask.size;
-  if (!high || !wide) return null;
-  const bits = new Uint8Array(high * wide);
+function fill(pixels, stride, { id, mask, inside, edge, x: left, y: top }) {
+  const [high, wide] = mask.size, bits = new Uint8Array(high * wide), [red, green, blue] = colourOf(id);
+  const colour = (alpha) => ((Math.round(255 * alpha) << 24) | (blue << 16) | (green << 8) | red) >>> 0;
+  const within = colour(inside), rim = colour(edge);
   let place = 0, filled = 0;
   for (const run of mask.runs) {
     if (filled) bits.fill(1, place, place + run);
     place += run;
     filled = 1 - filled;
   }
-  const image = new ImageData(wide, high), [red, green, blue] = colourOf(id);
-  for (let x = 0; x < wide; x++) {
-    for (let y = 0; y < high; y++) {
-      const k = x * high + y;
+  for (let x = 0, k = 0; x < wide; x++) {
+    for (let y = 0; y < high; y++, k++) {
       if (!bits[k]) continue;
-      const rim = !(y && bits[k - 1]) || !(y < high - 1 && bits[k + 1]) || !(x && bits[k - high]) || !(x < wide - 1 && bits[k + high]);
-      image.data.set([red, green, blue, 255 * (rim ? edge : inside)], 4 * (y * wide + x));
+      const deep = y && y < high - 1 && x && x < wide - 1 && bits[k - 1] && bits[k + 1] && bits[k - high] && bits[k + high];
+      pixels[(top + y) * stride + left + x] = deep ? within : rim;
     }
   }
-  const canvas = new OffscreenCanvas(wide, high);
-  canvas.getContext("2d").putImageData(image, 0, 0);
-  return canvas;
 }
 
 function paintOutline(ctx, to, row, outline) {
@@ -185,15 +214,19 @@ export function paintTrails(ctx, to, layer, frames, times, at, only) {
   for (const [id, line] of points) {
     const now = line[0][2];
     if (at - now > 1) continue;
-    for (let k = 1; k < line.length; k++) {
-      const [ax, ay, a, tall] = line[k - 1], [bx, by, b] = line[k];
-      if (a - b > 3 || Math.hypot(ax - bx, ay - by) > tall) continue; // no movement, but another box
-      const age = (times[at] - times[b]) / TRAIL_SECONDS;
+    for (let piece = 0; piece < PIECES; piece++) {
+      const from = Math.floor((piece * (line.length - 1)) / PIECES), till = Math.floor(((piece + 1) * (line.length - 1)) / PIECES);
+      if (till <= from) continue;
+      const age = (times[at] - times[line[from][2]]) / TRAIL_SECONDS;
       ctx.strokeStyle = css(colourOf(id), 0.85 * (1 - age) + 0.05);
       ctx.lineWidth = 2.2 * (1 - 0.5 * age);
       ctx.beginPath();
-      ctx.moveTo(to.x + ax * to.scale, to.y + ay * to.scale);
-      ctx.lineTo(to.x + bx * to.scale, to.y + by * to.scale);
+      for (let k = from; k <= till; k++) {
+        const [x, y, a] = line[k], [px, py, b, tall] = line[Math.max(from, k - 1)];
+        const broken = b - a > 3 || Math.hypot(px - x, py - y) > tall; // no movement, but another box
+        if (k === from || broken) ctx.moveTo(to.x + x * to.scale, to.y + y * to.scale);
+        else ctx.lineTo(to.x + x * to.scale, to.y + y * to.scale);
+      }
       ctx.stroke();
     }
   }

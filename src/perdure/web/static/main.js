@@ -61,12 +61,16 @@ async function take(standing) {
   const run = state.run, atEnd = state.standing?.live && state.at === state.frames.length - 1 && !state.playing;
   const grown = standing.frames !== state.frames.length || asked < 0;
   asked = standing.edition;
-  const [told, events, list] = await Promise.all([ask(`runs/${run}/tracks`), ask(`runs/${run}/events`), grown ? ask(`runs/${run}/frames`) : null]);
+  if (grown) {
+    const { frames, times } = await ask(`runs/${run}/frames`); // first: with them the film can be shown
+    if (run !== state.run) return;
+    set({ frames, times });
+  }
+  const [told, events] = await Promise.all([ask(`runs/${run}/tracks`), ask(`runs/${run}/events`)]);
   if (run !== state.run) return;
-  if (list) set({ frames: list.frames, times: list.times });
   layer().take(told);
   const doubt = state.doubt && [...events.doubts, ...events.events].find((one) => one.key.join() === state.doubt.key?.join());
-  set({ events, doubt: doubt ?? null, ...(atEnd ? { at: list.frames.length - 1 } : {}) });
+  set({ events, doubt: doubt ?? null, ...(atEnd ? { at: state.frames.length - 1 } : {}) });
   if (state.tab === "tracks") tracks.draw();
 }
 
@@ -250,6 +254,7 @@ async function begin() {
   byId("left-to-look").addEventListener("click", () => { set({ tab: "doubts" }); doubts.step(1); });
   byId("beside").addEventListener("change", (event) => beside(event.target.value));
   on("standing events frames about", drawBar);
+  on("frames", redraw);
   on("events tab about", drawTabs);
   on("tab", drawPanel);
   on("selected", () => state.selected && timeline.reveal(state.selected));

@@ -53,10 +53,11 @@ export class Layer {
     return block !== undefined;
   }
 
-  shapesAt(frame) {
+  // Silhouettes and contours of a frame by id, as far as they are here; `fetched` asks for those that are not.
+  shapesAt(frame, fetched = true) {
     if (!this.hasShapes) return null;
     const key = Math.floor(frame / SHAPES), held = this._shapes.get(key);
-    if (!held || held.edition !== this.edition) this._fetchShapes(key);
+    if (fetched && (!held || held.edition !== this.edition)) this._fetchShapes(key);
     return held?.value[frame] ?? null;
   }
 

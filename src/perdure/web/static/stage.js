@@ -2,9 +2,10 @@
 
 import { paintGrid, paintKnob, paintRows, paintTrails, paintZone } from "./draw.js";
 import { byId, h, put } from "./dom.js";
-import { frameNow, on, set, state } from "./store.js";
+import { frameNow, on, placeOf, set, state } from "./store.js";
 
 const MOST_ZOOM = 12, NEAR = 9; // px on screen: so near a point is grasped
+const REACH = 12; // s: of a dragged playhead, so far off a frame is shown instead of one that must be decoded
 
 export class Stage {
   // `layers` gives for each view { title, film, layer } ; `tools` are those that take clicks before tracks do.
@@ -16,7 +17,7 @@ export class Stage {
     this.tool = null; // { press(point, event), drag(point), lift(), double(point), hover(point), cursor }
     this._due = false;
     new ResizeObserver(() => this.redraw()).observe(byId("stage"));
-    on("events at selected partner hovered boxes shapes trails labels unseen zones ground tab follow", () => this.redraw());
+    on("events dragging at selected partner hovered boxes shapes trails labels unseen zones ground tab follow", () => this.redraw());
     this.rebuild();
   }
 
@@ -69,8 +70,12 @@ export class Stage {
     const wide = Math.round(canvas.clientWidth * ratio), high = Math.round(canvas.clientHeight * ratio);
     if (!wide || !high || !state.about) return;
     if (canvas.width !== wide || canvas.height !== high) Object.assign(canvas, { width: wide, height: high });
-    const frame = frameNow(), ctx = canvas.getContext("2d");
-    const picture = view.film.want(frame, view.soon?.() ?? []);
+    const ctx = canvas.getContext("2d");
+    let frame = frameNow(), picture = view.film.want(frame, view.soon?.() ?? [], state.dragging);
+    if (!picture && state.dragging) {
+      const near = view.film.nearest(frame, REACH * state.about.fps); // with its own boxes, until the playhead rests
+      if (near >= 0) [frame, picture] = [near, view.film.picture(near)];
+    }
     const why = view.film.wrong || view.film.problem.get(frame) || "";
     if (!picture && !why && state.frames.length) return; // until it is there the last one stays, with its own boxes
     const rows = view.layer.rowsAt(frame), ready = view.layer.ready(frame) || !state.frames.length;
@@ -101,9 +106,9 @@ export class Stage {
     }
     const editing = state.tab === "zones" || state.tab === "ground";
     ctx.globalAlpha = editing ? 0.5 : 1;
-    if (state.trails) paintTrails(ctx, to, view.layer, state.frames, state.times, state.at, null);
+    if (state.trails) paintTrails(ctx, to, view.layer, state.frames, state.times, frame === frameNow() ? state.at : placeOf(frame), null);
     paintRows(ctx, to, rows, {
-      shapes: view.layer.shapesAt(frame), options: state, hovered: state.hovered,
+      shapes: state.shapes ? view.layer.shapesAt(frame, !state.dragging) : null, options: state, hovered: state.hovered,
       selected: view.main ? state.selected : 0, partner: view.main ? state.partner : 0,
     });
     ctx.globalAlpha = 1;

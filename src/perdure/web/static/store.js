@@ -9,6 +9,7 @@ export const state = {
   times: [], // their times in seconds
   at: 0, // place in `frames`
   playing: false,
+  dragging: false, // the playhead
   speed: 1,
   selected: 0, // id
   partner: 0, // a second id, for swaps and joins

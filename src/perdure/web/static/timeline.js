@@ -5,7 +5,7 @@ import { byId, h, put } from "./dom.js";
 import { AMBIGUOUS, LOST, OCCLUDED, PARTLY } from "./rows.js";
 import { clock, frameNow, on, placeOf, set, state } from "./store.js";
 
-const RULER = 20, DOUBTS = 14, LANE = 15, LABEL = 46, KINDS = new Set(["merge", "split"]);
+const RULER = 20, DOUBTS = 14, LANE = 15, LABEL = 46, REST = 120, KINDS = new Set(["merge", "split"]);
 
 export class Timeline {
   constructor(layer, seek, choose) {
@@ -250,7 +250,7 @@ export class Timeline {
 
   _pointing() {
     const { canvas } = this;
-    let grasped = false;
+    let grasped = false, rest = 0;
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button) return;
       const y = event.offsetY, x = event.offsetX;
@@ -267,14 +267,23 @@ export class Timeline {
       grasped = true;
       canvas.setPointerCapture(event.pointerId);
       set({ playing: false });
+      clearTimeout(rest);
       this.seek(this._place(x));
     });
     canvas.addEventListener("pointermove", (event) => {
-      if (grasped) return void this.seek(this._place(event.offsetX));
+      if (grasped) {
+        set({ dragging: true });
+        clearTimeout(rest);
+        rest = setTimeout(() => set({ dragging: false }), REST);
+        return void this.seek(this._place(event.offsetX));
+      }
       const y = event.offsetY - RULER - DOUBTS + this.scroll;
       set({ hovered: event.offsetY > RULER + DOUBTS ? this._lanes()[Math.floor(y / LANE)] ?? 0 : 0 });
     });
-    canvas.addEventListener("pointerup", () => (grasped = false));
+    canvas.addEventListener("pointerup", () => {
+      grasped = false;
+      set({ dragging: false });
+    });
     canvas.addEventListener("pointerleave", () => set({ hovered: 0 }));
     canvas.addEventListener("dblclick", () => this._zoomTo(0, null));
     canvas.addEventListener("wheel", (event) => this._wheel(event), { passive: false });
