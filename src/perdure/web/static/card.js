@@ -61,7 +61,7 @@ function doubtBlock(one) {
       const [later, earlier] = one.kind === "appeared" ? [alone, other] : [other, alone];
       return action("Join ", k ? "" : "J", () => repair.join(later, earlier, { event: one.key }), { title: `${later} is ${earlier}: all rows of ${later} become those of ${earlier}`, children: [chip(later, { inert: true }), " into ", chip(earlier, { inert: true })] });
     }
-    return action("Swap ", k ? "" : "S", () => repair.swap(alone, other, one.begin, { event: one.key }), { title: `From frame ${one.begin} on each has the other's id`, children: [chip(alone, { inert: true }), " ", chip(other, { inert: true })] });
+    return action("Swap ", k ? "" : "S", () => repair.swap(alone, other, { begin: one.begin }, { event: one.key }), { title: `From frame ${one.begin} on each has the other's id`, children: [chip(alone, { inert: true }), " ", chip(other, { inert: true })] });
   });
   const next = async () => {
     if (one.key && !one.looked && one.doubt !== undefined) await repair.confirm(one);
@@ -93,11 +93,12 @@ function trackBlock(id) {
       h("button", { onclick: () => player.seekFrame(track.last), title: "Go to its last frame" }, "Last"),
       h("button", { "aria-pressed": String(state.follow), onclick: () => set({ follow: !state.follow }) }, "Follow", h("kbd", {}, "F")),
       action("Cut here", "C", () => repair.cut(id), { title: "From this frame on it gets a new id" }),
-      action("Delete", "Del", () => repair.remove(id), { cls: "danger", title: "Delete all its rows" }),
-      action("from here on", "", () => repair.remove(id, { begin: here }), { cls: "danger", title: "Delete its rows from this frame on" })),
+      action("Delete all", "Del", () => repair.remove(id), { cls: "danger", title: "Delete all its rows" }),
+      action("Delete from here", "", () => repair.remove(id, { begin: here }), { cls: "danger", title: "Delete its rows from this frame on" })),
     h("div", { class: "actions" },
       h("span", { class: "quiet", style: { alignSelf: "center" } }, "With"), choice,
       action("Swap from here", "S", () => repair.swap(id, partner), { title: partner ? `From this frame on ${id} and ${partner} have each other's id` : "Choose the other id: Shift-click it" }),
+      action("up to here", "", () => repair.swap(id, partner, { begin: 0, end: here }), { title: partner ? `Up to this frame ${id} and ${partner} have each other's id` : "Choose the other id: Shift-click it" }),
       action("Join into", "J", () => repair.join(id, partner), { title: partner ? `All rows of ${id} become those of ${partner}` : "Choose the other id: Shift-click it" })));
 }
 

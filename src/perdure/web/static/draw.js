@@ -265,7 +265,9 @@ export function paintZone(ctx, to, zone, chosen, open) {
   if (chosen || open) for (const ring of zone.rings) for (const point of ring) paintKnob(ctx, to, point, css(colour));
   if (!open && zone.name) {
     const [x, y] = zone.rings[0].reduce(([a, b], [c, d]) => (d < b ? [c, d] : [a, b]));
-    paintWords(ctx, to.x + x * to.scale, to.y + y * to.scale + 12, zone.name, css(colour));
+    ctx.font = LETTERS;
+    const half = ctx.measureText(zone.name).width / 2 + 6;
+    paintWords(ctx, Math.max(Math.max(0, to.x) + half, to.x + x * to.scale), to.y + y * to.scale + 14, zone.name, css(colour));
   }
 }
 

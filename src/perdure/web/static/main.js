@@ -177,7 +177,6 @@ function shortcuts() {
   const chosen = (run) => () => (state.selected ? run() : toast("Select an id first: click a person, or a lane of the timeline"));
   const both = (run) => chosen(() => (state.partner ? run() : toast("Choose the other id: Shift-click it")));
   const loose = () => ["appeared", "lost"].includes(state.doubt?.kind);
-  const begin = () => (state.doubt && state.doubt.begin === frameNow() ? state.doubt.begin : frameNow());
   const joins = () => {
     const [one, other] = [state.selected, state.partner];
     return loose() && state.doubt.kind === "lost" && state.doubt.ids[0] === one ? repair.join(other, one) : repair.join(one, other);
@@ -201,7 +200,8 @@ function shortcuts() {
       ["R", "Play around the doubt", () => state.doubt && player.around(state.doubt.begin, state.doubt.end), "r"],
     ]],
     ["Repair", [
-      ["S", "Swap the two ids from here on", both(() => repair.swap(state.selected, state.partner, begin())), "s"],
+      ["S", "Swap the two ids from here on", both(() => repair.swap(state.selected, state.partner)), "s"],
+      ["Shift+S", "Swap them up to here", both(() => repair.swap(state.selected, state.partner, { begin: 0, end: frameNow() })), "Shift+s"],
       ["J", "Join the id into the other", both(joins), "j"],
       ["C", "Cut: a new id from here on", chosen(() => repair.cut(state.selected)), "c"],
       ["Del", "Delete the id", chosen(() => repair.remove(state.selected)), ["Delete", "d"]],

@@ -7,11 +7,12 @@ import { frameNow, set, state } from "./store.js";
 let refresh = async () => {};
 export const afterwards = (run) => (refresh = run); // what is to be asked anew when something was corrected
 
+const span = (begin, end) => (end === undefined ? `from frame ${begin} on` : begin ? `in frames ${begin} to ${end}` : `up to frame ${end}`);
 const WORDS = {
-  swap: ({ ids, begin }) => `Swapped ${ids[0]} and ${ids[1]} from frame ${begin} on`,
+  swap: ({ ids, begin, end }) => `Swapped ${ids[0]} and ${ids[1]} ${span(begin, end)}`,
   join: ({ ids }) => `Joined ${ids[0]} into ${ids[1]}`,
   cut: ({ ids, begin }) => `Cut ${ids[0]}: from frame ${begin} on it is ${ids[1]}`,
-  delete: ({ ids, begin, end }) => `Deleted ${ids[0]}${begin ? ` from frame ${begin} on` : end !== undefined ? ` up to frame ${end}` : ""}`,
+  delete: ({ ids, begin, end }) => `Deleted ${ids[0]}${begin || end !== undefined ? ` ${span(begin, end)}` : ""}`,
   confirm: () => "Marked as right",
 };
 
@@ -44,14 +45,14 @@ const settles = (ids) => {
   return looked && !looked.looked && looked.key && ids.some((id) => looked.ids.includes(id)) ? { event: looked.key } : {};
 };
 
-export const swap = (one, other, begin = frameNow(), about = settles([one, other])) =>
-  correct({ do: "swap", ids: [one, other], begin, ...about });
+export const swap = (one, other, when = {}, about = settles([one, other])) =>
+  correct({ do: "swap", ids: [one, other], begin: frameNow(), ...when, ...about });
 export const join = async (one, into, about = settles([one, into])) => {
   const done = await correct({ do: "join", ids: [one, into], begin: 0, ...about });
   if (done && state.selected === one) set({ selected: into, partner: 0 });
 };
 export const cut = (one, begin = frameNow(), about = settles([one])) => correct({ do: "cut", ids: [one, 0], begin, ...about });
-export const remove = (one, span = {}, about = settles([one])) => correct({ do: "delete", ids: [one], begin: 0, ...span, ...about });
+export const remove = (one, when = {}, about = settles([one])) => correct({ do: "delete", ids: [one], begin: 0, ...when, ...about });
 export const confirm = (doubt) => correct({ do: "confirm", ids: doubt.ids, begin: doubt.begin, event: doubt.key }, { quiet: true });
 
 export async function undo() {

@@ -9,6 +9,7 @@ import { on, set, state } from "./store.js";
 const SHARES = new Set(["HOTA", "DetA", "AssA", "MOTA", "IDF1", "IDP", "IDR"]);
 const LOWER_IS_BETTER = new Set(["IDSW", "Frag", "FP", "FN"]);
 const ABOUT = { IDSW: "identity switches", Frag: "fragmentations", FP: "false rows", FN: "missed rows", IDP: "identity precision", IDR: "identity recall" };
+const SHORT = 25; // frames: so long a fault may be mended in its own frames alone
 let player = null, kind = "identity", first = null, wrong = "", chosen = null;
 
 export function begin(thePlayer) {
@@ -36,14 +37,18 @@ async function load() {
 
 const listed = () => (state.score?.mistakes ?? []).filter((one) => kind === "all" || (kind === "identity" ? one.kind === "exchange" || one.kind === "switch" || one.kind === "resolution" : one.kind === kind));
 
-// What would mend a fault of identity, if one action does.
-function mending(fault) {
-  if (fault.ids.length === 2 && (fault.kind === "exchange" || fault.kind === "switch")) {
-    const [one, other] = fault.ids;
-    return { words: ["Swap ", chip(one, { inert: true }), " ", chip(other, { inert: true }), ` from ${fault.begin}`], run: () => repair.swap(one, other, fault.begin, {}) };
+// What may mend a fault: [words, action]. Of an exchange the page cannot know which part is right; who looks can.
+function mendings(fault) {
+  const { ids, kind: what, begin: from, cost } = fault;
+  if (ids.length === 2 && (what === "exchange" || what === "switch")) {
+    const swap = (when) => () => repair.swap(ids[0], ids[1], when, {});
+    const both = ["Swap ", chip(ids[0], { inert: true }), " ", chip(ids[1], { inert: true })];
+    const offers = [[[both, ` from ${from}`], swap({ begin: from })], [`before ${from}`, swap({ begin: 0, end: from - 1 })]];
+    if (cost <= SHORT) offers.push([cost === 1 ? `only in ${from}` : `only ${from}–${from + cost - 1}`, swap({ begin: from, end: from + cost - 1 })]);
+    return offers;
   }
-  if (fault.kind === "invented") return { words: ["Delete ", chip(fault.ids[0], { inert: true })], run: () => repair.remove(fault.ids[0], {}, {}) };
-  return null;
+  if (what === "invented") return [[["Delete ", chip(ids[0], { inert: true })], () => repair.remove(ids[0], {}, {})]];
+  return [];
 }
 
 export function draw() {
@@ -66,7 +71,7 @@ export function draw() {
 }
 
 function item(fault) {
-  const current = chosen === fault, mend = current && state.session.writable && mending(fault);
+  const current = chosen?.text === fault.text && chosen.begin === fault.begin, offers = current && state.session.writable ? mendings(fault) : [];
   const look = () => {
     chosen = fault;
     set({ selected: fault.ids[0] ?? 0, partner: fault.ids[1] ?? 0, playing: false, doubt: null });
@@ -77,6 +82,6 @@ function item(fault) {
     h("button", { class: "item", "aria-current": current ? "true" : null, onclick: look },
       h("span", { class: "head" }, h("span", { class: "kind" }, words(fault.kind)), fault.ids.map((id) => chip(id, { inert: true })), h("span", { class: "when" }, `frame ${fault.begin} · ${fault.cost} rows`)),
       h("span", { class: "why" }, fault.text)),
-    mend && h("div", { class: "actions", style: { padding: "0 12px 10px" } }, h("button", { class: "primary mend", onclick: mend.run }, mend.words)),
+    offers.length > 0 && h("div", { class: "actions mending" }, offers.map(([label, run], k) => h("button", { class: k ? "mend" : "mend primary", onclick: run }, label))),
   ];
 }

@@ -62,7 +62,8 @@ export class Stage {
     const wide = box.clientWidth, high = box.clientHeight;
     const fit = Math.min(wide / width, high / height) || 1, scale = fit * this.zoom;
     const [cx, cy] = this.centre ?? [width / 2, height / 2];
-    return { scale, x: wide / 2 - cx * scale, y: high / 2 - cy * scale, top: 0, wide, high };
+    const held = (middle, size, room) => (size * scale <= room ? (room - size * scale) / 2 : Math.min(0, Math.max(room - size * scale, room / 2 - middle * scale)));
+    return { scale, x: held(cx, width, wide), y: held(cy, height, high), top: 0, wide, high };
   }
 
   _paint(view) {
@@ -96,6 +97,11 @@ export class Stage {
   }
 
   _overlay(ctx, to, view, rows, frame) {
+    const { width, height } = state.about;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(to.x - 1, to.y - 1, width * to.scale + 2, height * to.scale + 2);
+    ctx.clip();
     if (state.tab === "ground" && state.ground) {
       paintGrid(ctx, to, state.ground.grid);
       state.ground.points.forEach((point, k) => paintKnob(ctx, to, point, "rgb(120 200 235)", "ABCD"[k]));
@@ -104,6 +110,7 @@ export class Stage {
       for (const zone of state.zones.list) paintZone(ctx, to, zone, state.tab === "zones" && zone === state.zones.chosen, false);
       if (state.zones.drawing) paintZone(ctx, to, state.zones.drawing, true, true);
     }
+    ctx.restore();
     const editing = state.tab === "zones" || state.tab === "ground";
     ctx.globalAlpha = editing ? 0.5 : 1;
     if (state.trails) paintTrails(ctx, to, view.layer, state.frames, state.times, frame === frameNow() ? state.at : placeOf(frame), null);

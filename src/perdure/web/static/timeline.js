@@ -118,9 +118,22 @@ export class Timeline {
     for (const [id, y] of place) if (y > -LANE && y < high) this._paintLane(ctx, this.layer().tracks.get(id), y, wide);
     this._paintMeetings(ctx, place);
     this._paintLabels(ctx, place, high);
+    this._paintScroll(ctx, lanes.length * LANE, wide);
     ctx.restore();
     this._paintRuler(ctx, wide);
     this._paintDoubts(ctx, wide);
+  }
+
+  // How far down the lanes go.
+  _paintScroll(ctx, whole, wide) {
+    const room = this._high();
+    if (whole <= room) return;
+    ctx.fillStyle = this.look.faint;
+    ctx.globalAlpha = 0.6;
+    ctx.beginPath();
+    ctx.roundRect(wide - 6, RULER + DOUBTS + 2 + (this.scroll / whole) * (room - 4), 4, (room / whole) * (room - 4), 2);
+    ctx.fill();
+    ctx.globalAlpha = 1;
   }
 
   _paintLane(ctx, track, y, wide) {
