@@ -1,4 +1,4 @@
-"""The command line: `perdure track | detect | draw | export | score | demo | warmup`."""
+"""The command line: `perdure track | detect | draw | view | export | score | demo | warmup`."""
 
 import os
 import sys

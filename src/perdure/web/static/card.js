@@ -40,10 +40,10 @@ async function explain() {
 
 export function draw() {
   const hidden = state.tab === "zones" || state.tab === "ground";
-  const parts = hidden ? [] : [state.doubt && doubtBlock(state.doubt), state.selected > 0 && trackBlock(state.selected), h("div", { id: "reasons" })];
+  const parts = hidden ? [] : [state.doubt && state.tab !== "score" && doubtBlock(state.doubt), state.selected > 0 && trackBlock(state.selected), h("div", { id: "reasons" })];
   put(byId("card"), parts);
   if (!hidden) drawReasons();
-  if (!state.doubt && !state.selected) put(byId("card"));
+  if (!(state.doubt && state.tab !== "score") && !state.selected) put(byId("card"));
 }
 
 const only = (text) => (state.session?.writable ? text : "Open the address that `perdure view` printed to correct");

@@ -19,6 +19,6 @@ const WORDS = {
   approximated: "Approximated", lost: "Lost", narrow: "Narrow link", appeared: "Appeared inside", entered: "Entered",
   left: "Left", merge: "Merge", split: "Split", mixed: "Mixed", occluded: "Hidden", partly_occluded: "Partly hidden",
   suspended: "Suspended", light: "Light changed", removed: "Something removed", abandoned: "Something left behind",
-  context: "Context", exchange: "Identities exchanged", switch: "Identity switched", invented: "Invented", resolution: "Wrong resolution",
+  context: "Context", exchange: "Exchange", switch: "Switch", invented: "Invented", resolution: "Wrong resolution",
 };
 export const words = (kind) => WORDS[kind] ?? kind.replaceAll("_", " ");

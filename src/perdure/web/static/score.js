@@ -66,7 +66,7 @@ export function draw() {
   const faults = listed();
   put(byId("panel"),
     h("dl", { class: "scores", style: { margin: 0 } }, figures),
-    h("div", { class: "toolbar" }, choice, h("span", { class: "spring" }), h("span", { class: "quiet" }, `${faults.length} mistakes, worst first`)),
+    h("div", { class: "toolbar" }, choice, h("span", { class: "spring" }), h("span", { class: "quiet" }, `${faults.length}, worst first`)),
     faults.length ? h("ul", { class: "list" }, faults.map((one) => h("li", {}, item(one)))) : h("div", { class: "empty" }, h("b", {}, "No mistakes of this kind"), `against ${state.about.truth}`));
 }
 
@@ -77,6 +77,7 @@ function item(fault) {
     set({ selected: fault.ids[0] ?? 0, partner: fault.ids[1] ?? 0, playing: false, doubt: null });
     player.seekFrame(fault.begin);
     draw();
+    byId("panel").querySelector(".mending")?.scrollIntoView({ block: "nearest" });
   };
   return [
     h("button", { class: "item", "aria-current": current ? "true" : null, onclick: look },

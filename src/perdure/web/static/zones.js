@@ -7,8 +7,8 @@ import { ZONE_COLOURS } from "./draw.js";
 import { on, set, state, touch } from "./store.js";
 
 const KIND_WORDS = {
-  entry: "where people come in", exit: "where people leave", occlusion: "what hides people", "low-contrast": "where people are hard to see",
-  noise: "where much is seen that is nobody", ignore: "what is seen there does not count", ground: "where people can stand",
+  entry: "people come in", exit: "people leave", occlusion: "hides people", "low-contrast": "hard to see",
+  noise: "seen, but nobody", ignore: "does not count", ground: "people can stand",
 };
 let stage = null, problem = "", saved = "";
 
