@@ -158,31 +158,31 @@ def serve() -> Iterator[Callable[..., Viewer]]:
     from perdure.web.run import OpenRun
     from perdure.web.truths import OpenTruth
 
-    ends: list[Callable[[], None]] = []
+    servers: list[tuple[Any, threading.Thread, socket.socket]] = []
 
     def started(*folders: RunFolder, truth: Path | None = None, **files: Path) -> Viewer:
         truths = tuple(OpenTruth(truth) if truth else None for _ in folders)
         shown = Shown(tuple(OpenRun(one) for one in folders), truths, **files)
         listening = socket.create_server(("127.0.0.1", 0))
-        settings = uvicorn.Config(application(shown, "secret"), log_level="error", lifespan="on", ws="none")
+        settings = uvicorn.Config(
+            application(shown, "secret"), log_level="error", lifespan="on", ws="none", timeout_graceful_shutdown=1
+        )
         server = uvicorn.Server(settings)
         thread = threading.Thread(target=server.run, args=([listening],), daemon=True)
         thread.start()
 
-        def end() -> None:
-            server.should_exit = server.force_exit = True
-            thread.join(10)
-            listening.close()
-
-        ends.append(end)
+        servers.append((server, thread, listening))
         viewer = Viewer(listening.getsockname()[1], "secret")
         while not viewer.ask("/api/runs/0/state").value["complete"]:
             pass
         return viewer
 
     yield started
-    for end in ends:
-        end()
+    for server, _, _ in servers:
+        server.should_exit = True
+    for _, thread, listening in servers:
+        thread.join(10)
+        listening.close()
 
 
 @pytest.fixture(scope="session")

@@ -69,6 +69,7 @@ def test_every_frame_is_the_one_that_its_number_says(run: RunFolder, serve, open
         assert abs(grey(page) - (40 + frame)) <= 2
 
 
+@pytest.mark.slow
 def test_playing_shows_every_frame_to_the_end(run: RunFolder, serve, open_page):
     page = open_page(serve(run))
     go_to(page, FILM - 9)
@@ -189,6 +190,7 @@ def test_a_zone_is_drawn_named_and_saved_where_track_reads_it(run: RunFolder, se
     )
 
 
+@pytest.mark.slow
 def test_a_zone_that_crosses_itself_is_refused_in_words(run: RunFolder, serve, open_page):
     page = open_page(serve(run))
     page.get_by_role("tab", name="Zones").click()
@@ -205,6 +207,7 @@ def test_a_zone_that_crosses_itself_is_refused_in_words(run: RunFolder, serve, o
 def test_four_points_and_their_distances_make_a_ground_plane(run: RunFolder, serve, open_page):
     page = open_page(serve(run))
     page.get_by_role("tab", name="Ground").click()
+    page.get_by_text("Click four points").wait_for()
     for x, y in ((20, 110), (140, 110), (110, 50), (50, 50)):
         page.mouse.click(*at(page, x, y))
     for name, metres in (
@@ -236,6 +239,7 @@ def test_the_truth_stands_beside_the_run_in_the_same_frame(run: RunFolder, truth
     assert shown.first.get_attribute("data-rows") == "2"
 
 
+@pytest.mark.slow
 def test_another_run_stands_beside_and_may_be_shown_instead(
     run: RunFolder, film: Path, tmp_path, serve, open_page
 ):
@@ -273,6 +277,7 @@ def test_a_damaged_log_is_shown_as_far_as_it_is_sound_with_a_message(run: RunFol
     page.get_by_text("20 frames").wait_for()
 
 
+@pytest.mark.slow
 def test_damaged_corrections_are_told_and_the_run_is_shown_without_them(run: RunFolder, serve, open_page):
     run.corrections.write_text('{"format":"perdure-corrections","version":1}\n{"do":"swop"}\n')
     viewer = serve(run)
@@ -292,17 +297,20 @@ def test_without_the_token_all_can_be_seen_and_nothing_changed(run: RunFolder, s
     assert not run.corrections.exists()
 
 
+@pytest.mark.slow
 def test_the_token_does_not_stay_in_the_address(run: RunFolder, serve, open_page):
     page = open_page(serve(run))
     assert "secret" not in page.url
 
 
+@pytest.mark.slow
 def test_a_film_that_is_gone_is_told_and_the_boxes_are_drawn_all_the_same(tmp_path, serve, open_page):
     page = open_page(serve(write_run(tmp_path / "run", tmp_path / "gone")))
     page.get_by_text(re.compile("no picture: .*gone does not exist")).wait_for()
     assert page.locator("canvas[data-frame]").get_attribute("data-rows") == "2"
 
 
+@pytest.mark.slow
 def test_a_run_of_nothing_is_a_run(tmp_path, film: Path, serve, open_page):
     page = open_page(serve(write_run(tmp_path / "run", film, frames=0)))
     page.get_by_text("Nothing is doubtful").wait_for()
@@ -316,6 +324,7 @@ def test_why_an_id_tells_the_features(run: RunFolder, serve, open_page):
     assert "0.70" in reasons.inner_text()
 
 
+@pytest.mark.slow
 def test_the_page_of_keys_opens_and_closes(run: RunFolder, serve, open_page):
     page = open_page(serve(run))
     page.keyboard.press("?")
@@ -324,6 +333,7 @@ def test_the_page_of_keys_opens_and_closes(run: RunFolder, serve, open_page):
     assert not page.get_by_role("dialog").is_visible()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_light_and_dark_follow_the_system_until_one_is_chosen(run: RunFolder, serve, open_page, scheme: str):
     page = open_page(serve(run), color_scheme=scheme)
@@ -335,6 +345,7 @@ def test_light_and_dark_follow_the_system_until_one_is_chosen(run: RunFolder, se
     assert page.locator("html").get_attribute("data-theme") == other
 
 
+@pytest.mark.slow
 def test_every_button_and_field_has_a_name(run: RunFolder, truth: Path, serve, open_page):
     page = open_page(serve(run, truth=truth))
     page.locator(".item").first.click()

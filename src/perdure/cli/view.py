@@ -136,6 +136,7 @@ def _listen(port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((HOST, port))
+        listening.listen(128)  # from now on who comes waits: the address may be printed
     except OSError as error:
         listening.close()
         raise OutputError(

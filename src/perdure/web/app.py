@@ -302,7 +302,7 @@ async def _read_ahead(run: OpenRun) -> None:
     """Read a log to its end, a slice at a time, so that others are heard in between."""
     while True:
         await run_in_threadpool(run.refresh)
-        await anyio.sleep(0.01)
+        await anyio.sleep(0.005)
         if run.ledger.complete:
             return
 

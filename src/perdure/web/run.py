@@ -32,7 +32,7 @@ from perdure.web.pictures import Pictures
 from perdure.web.settled import Change, Settled, settle_columns
 
 Json = Any
-_SLICE = 0.25  # s for which a log is read before somebody else may ask
+_SLICE = 0.04  # s for which a log is read before somebody else may ask
 _LIVE = 15.0  # s without a new line, after which a run that says it is running is taken for dead
 
 
@@ -191,17 +191,14 @@ class OpenRun:
     def explain(self, identity: int, frame: int) -> dict[str, Json]:
         """Return why the row of an id in a frame is its own: its row, its link's reason, and events about it.
 
-        Raises
-        ------
-        ParameterError
-            If there is no such row.
+        Only `missing`, in words, where there is no such row.
         """
         with self._lock:
             made = self._settle()
             rows = made.settled.between(frame, frame + 1).rows
             (place,) = np.nonzero(rows.ids == identity)
             if not len(place):
-                raise ParameterError(f"id {identity} has no row in frame {frame}")
+                return {"missing": f"{identity} has no row in frame {frame}"}
             known, row = made.known, int(place[0])
             reason = self._reason(identity, frame, known)
             events = [event for _, event in settled_events(self.ledger, known) if identity in event.ids]
