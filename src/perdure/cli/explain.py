@@ -88,7 +88,11 @@ def _overview(folder: RunFolder, most: int, *, as_json: bool) -> None:
     links = most_doubtful(lambda: folder.entries(with_masks=False), most)
     note = "" if links else _without_reasons(folder.read_about())
     if as_json:
-        value = {"run": str(folder.path), "note": note, "links": [{"id": one, **as_value(why)} for one, why in links]}
+        value = {
+            "run": str(folder.path),
+            "note": note,
+            "links": [{"id": one, **as_value(why)} for one, why in links],
+        }
         print(json.dumps(value))
         return
     if not links:

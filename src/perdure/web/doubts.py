@@ -17,13 +17,13 @@ when all others are known, is not.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.fold import Corrections
+from perdure.fold import Corrections, coherent
 from perdure.reasons import DECIDING
 from perdure.types import Event
 from perdure.web.ledger import Ledger
@@ -105,15 +105,18 @@ def doubts(ledger: Ledger, known: Corrections, settled: Settled, size: tuple[int
     return sorted(found, key=lambda one: (-one.doubt, one.begin, one.key))
 
 
-def settled_events(ledger: Ledger, known: Corrections) -> list[tuple[Key, Event]]:
-    """Return all events with their settled ids, in the order of their beginnings."""
-    found = [((number, place), known.event(event, number)) for number, place, event in ledger.events]
-    whole = [
-        (key, after)
-        for (key, after), (_, _, before) in zip(found, ledger.events, strict=True)
+def settled_events(ledger: Ledger, known: Corrections, ids: Collection[int]) -> list[tuple[Key, Event]]:
+    """Return all events that are still true with their settled ids, in the order in which they began.
+
+    `ids` are those that have rows.
+    """
+    settled = [known.event(event, number) for number, _, event in ledger.events]
+    keys = {
+        id(after): (number, place)
+        for after, (number, place, before) in zip(settled, ledger.events, strict=True)
         if after.ids or not before.ids
-    ]
-    return sorted(whole, key=lambda one: (one[1].begin, one[0]))
+    }
+    return [(keys[id(one)], one) for one in coherent(settled, ids) if id(one) in keys]
 
 
 def _decisions(

@@ -46,6 +46,7 @@ class _Made:
     doubts: list[Doubt] | None = None
     tracks: dict[str, Json] | None = None
     said_ids: list[int] = field(default_factory=list)
+    ids: frozenset[int] = frozenset()  # that have rows
 
 
 class OpenRun:
@@ -184,7 +185,8 @@ class OpenRun:
                 "doubtful": sum(one["doubtful"] for one in told),
                 "open": sum(one["doubtful"] and not one["looked"] for one in told),
                 "events": [
-                    {"key": key, **asdict(event)} for key, event in settled_events(self.ledger, made.known)
+                    {"key": key, **asdict(event)}
+                    for key, event in settled_events(self.ledger, made.known, made.ids)
                 ],
             }
 
@@ -201,7 +203,7 @@ class OpenRun:
                 return {"missing": f"{identity} has no row in frame {frame}"}
             known, row = made.known, int(place[0])
             reason = self._reason(identity, frame, known)
-            events = [event for _, event in settled_events(self.ledger, known) if identity in event.ids]
+            events = [event for _, event in settled_events(self.ledger, known, made.ids) if identity in event.ids]
             return {
                 "id": identity,
                 "frame": frame,
@@ -282,10 +284,12 @@ class OpenRun:
                 changes += [(number, change) for change in report.dropped]
             for number, change in changes:
                 by_id.setdefault(getattr(change, "old", getattr(change, "id", 0)), []).append((number, change))
+            settled = settle_columns(said, changes)
             self._made = _Made(
                 self._edition,
                 Corrections(by_id, {}),
-                settle_columns(said, changes),
+                settled,
+                ids=frozenset(np.unique(settled.rows.ids).tolist()),
                 said_ids=np.unique(np.concatenate([said.ids, said.groups])).tolist(),
             )
         return self._made
@@ -298,10 +302,9 @@ class OpenRun:
 
     def _refuse_unknown(self, line: Correction, made: _Made) -> None:
         """Refuse what speaks of ids that nobody has."""
-        known = set(np.unique(made.settled.rows.ids).tolist())
         named = line.ids[:1] if line.do == "cut" else line.ids
         for one in named if line.do != "confirm" else ():
-            if one not in known:
+            if one not in made.ids:
                 raise ParameterError(f"there is no id {one} in the results any more")
         if line.do == "cut" and line.ids[1] != 0:
             raise ParameterError("the new id of a cut is found here; give 0 for it")
