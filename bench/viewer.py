@@ -27,11 +27,11 @@ from typing import Any
 import av
 import numpy as np
 
-from perdure.features.masks import run_lengths
 from perdure.files.lines import to_line
 from perdure.files.log import FORMAT, VERSION
 from perdure.files.runs import RunFolder
 from perdure.types import Mask
+from perdure.types.frame import run_lengths
 
 FPS = 25
 SIZE = (26, 60)  # of a silhouette, px

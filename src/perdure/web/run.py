@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from perdure.web.doubts import LIMIT, Doubt, doubts, settled_events
 from perdure.web.ledger import Columns, Ledger
 from perdure.web.pictures import Pictures
 from perdure.web.settled import Change, Settled, settle_columns
+from perdure.web.words import looked_words, words_of
 
 Json = Any
 _SLICE = 0.04  # s for which a log is read before somebody else may ask
@@ -78,6 +80,7 @@ class OpenRun:
         self._grown = time.monotonic()
         self._unsaved: threading.Timer | None = None
         self._wrong_results = ""
+        self._file = (0, 0)  # time and size of the corrections as they were read
         self._read_history()
 
     # What is known -----------------------------------------------------------------------------------------
@@ -96,6 +99,10 @@ class OpenRun:
             if self.about.get("status") == "running":
                 self.about = _about(self.folder) or self.about
                 self.size = _size(self.about) if all(_size(self.about)) else self.size
+            if (
+                _stamp(self.folder.corrections) != self._file
+            ):  # somebody else has corrected, or taken the file away
+                self._read_history()
             now = (self.ledger.version, self._history)
             if now != self._seen:
                 self._seen, self._edition = now, self._edition + 1
@@ -120,8 +127,8 @@ class OpenRun:
                 "status": str(self.about.get("status", "")),
                 "rows": len(rows.ids),
                 "notes": [one for one in (self.ledger.damage, self._history_wrong, self._wrong_results) if one],
-                "undo": _words(history.in_force[-1]) if history.in_force else "",
-                "redo": _words(history.undone[-1]) if history.undone else "",
+                "undo": words_of(history.in_force[-1]) if history.in_force else "",
+                "redo": words_of(history.undone[-1]) if history.undone else "",
                 "corrections": sum(one.do != "confirm" for one in history.in_force),
                 "saved": self._unsaved is None,
             }
@@ -176,7 +183,7 @@ class OpenRun:
                 made.doubts = doubts(self.ledger, made.known, made.settled, self.size, self.fps)
             looked = {one.event: one.do for one in self._history.in_force if one.event is not None}
             told = [
-                asdict(one) | {"doubtful": one.doubt >= LIMIT, "looked": _looked(looked.get(one.key))}
+                asdict(one) | {"doubtful": one.doubt >= LIMIT, "looked": looked_words(looked.get(one.key))}
                 for one in made.doubts
             ]
             return {
@@ -245,7 +252,7 @@ class OpenRun:
                 self._refuse_unknown(line, made)
                 line = with_new_id(line, newest_id(made.said_ids, self._history))
             self._history = append_correction(self.folder.corrections, line)
-            self._history_wrong = ""
+            self._history_wrong, self._file = "", _stamp(self.folder.corrections)
             self._save_later()
             return {"done": line if isinstance(line, str) else line.to_json(), **self.state()}
 
@@ -295,8 +302,9 @@ class OpenRun:
         return self._made
 
     def _read_history(self) -> None:
+        self._file = _stamp(self.folder.corrections)
         try:
-            self._history = read_corrections(self.folder.corrections)
+            self._history, self._history_wrong = read_corrections(self.folder.corrections), ""
         except FormatError as error:
             self._history, self._history_wrong = History(), f"{error}; shown is the run without any"
 
@@ -341,6 +349,15 @@ def _about(folder: RunFolder) -> dict[str, Json]:
         return {}
 
 
+def _stamp(path: Path) -> tuple[int, int]:
+    """What changes with a file; zeros where there is none."""
+    try:
+        about = path.stat()
+    except OSError:
+        return 0, 0
+    return about.st_mtime_ns, about.st_size
+
+
 def _size(about: Mapping[str, Json]) -> tuple[int, int]:
     width, height = about.get("width"), about.get("height")
     if isinstance(width, int) and isinstance(height, int) and 0 < width <= 1 << 16 and 0 < height <= 1 << 16:
@@ -365,23 +382,3 @@ def _about_frame(events: Sequence[Event], frame: int) -> list[Event]:
     """The events that a frame lies in, and before them the last one that decided whose the id is."""
     earlier = [one for one in events if one.kind in DECIDING and one.end < frame]
     return earlier[-1:] + [one for one in events if one.begin <= frame <= one.end]
-
-
-def _looked(do: str | None) -> str:
-    """What somebody said of a doubt."""
-    return "" if do is None else "right" if do == "confirm" else "repaired"
-
-
-def _words(one: Correction) -> str:
-    """A correction in few words."""
-    ids = one.ids
-    span = f"from frame {one.begin} on" if one.end is None else f"in frames {one.begin} to {one.end}"
-    if one.do == "confirm":
-        return "marked as right: " + " ".join(map(str, ids))
-    if one.do == "swap":
-        return f"swapped {ids[0]} and {ids[1]} {span}"
-    if one.do == "join":
-        return f"joined {ids[0]} into {ids[1]}" + ("" if one.begin == 0 and one.end is None else f" {span}")
-    if one.do == "cut":
-        return f"cut {ids[0]} {span}: now {ids[1]}"
-    return f"deleted {ids[0]}" + ("" if one.begin == 0 and one.end is None else f" {span}")
