@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 from web.conftest import CROSSING, FILM
 
@@ -12,11 +14,12 @@ from perdure.web.run import OpenRun
 
 
 @pytest.fixture
-def opened(run: RunFolder) -> OpenRun:
+def opened(run: RunFolder) -> Iterator[OpenRun]:
     one = OpenRun(run)
     while not one.ledger.complete:
         one.refresh()
-    return one
+    yield one
+    one.close()
 
 
 def test_what_somebody_else_corrects_is_seen(opened: OpenRun):
