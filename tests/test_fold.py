@@ -118,3 +118,12 @@ def test_events_do_not_contradict_corrections():
     settled = [corrections.event(one, k) for k, report in enumerate(reports) for one in report.events]
     told = coherent(settled, set(settle(reports).ids.tolist()))
     assert [(one.kind, one.ids) for one in told] == [("entered", (1,)), ("exchanged", (1, 2)), ("alarm", ())]
+
+
+def test_of_several_of_whom_one_is_left_nothing_has_happened():
+    reports = [Report(said(0, 1, 2, 3)), Report(renamed=(Renamed(2, 1, 0, 9),), dropped=(Dropped(3, 0, 9),))]
+    corrections = Corrections.of(reports)
+    assert corrections.event(Event("meets", 0, 0, (1, 2)), 0).ids == ()
+    assert corrections.event(Event("meets", 0, 0, (1, 3)), 0).ids == ()
+    assert corrections.event(Event("merge", 0, 0, (1, 2, 3, 4)), 0).ids == (1, 4)
+    assert corrections.event(Event("stops", 0, 0, (2,)), 0).ids == (1,)

@@ -111,6 +111,20 @@ def test_pictures_of_another_size_are_scaled_to_the_first():
     assert "they are scaled" in source.warnings[0]
 
 
+def test_a_source_that_is_not_there_yet_is_waited_for():
+    camera = Camera(lambda k: picture(size=(48, 64)))
+    port = camera.port
+    camera.stop()
+    on = threading.Timer(0.5, lambda: camera.start(port))
+    on.start()
+    source = open_live(camera.url, wait=True)
+    assert (source.width, source.height) == (64, 48)
+    source.close()
+    camera.stop()
+    with pytest.raises(VideoError, match="cannot be reached"):
+        open_live("rtsp://127.0.0.1:9/none", patience=Patience(give_up=0.05), wait=True)
+
+
 def test_what_is_neither_a_camera_nor_a_url_is_refused():
     with pytest.raises(ParameterError, match="`perdure track` follows files"):
         open_live("film.mp4")

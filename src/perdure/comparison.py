@@ -23,6 +23,9 @@ from perdure.types import Event, Rows, Use
 NO_ROWS = Rows.of(frames=(), ids=())
 
 
+_NEAR = 5  # frames, by which a truth may reach beyond the rows of a run of the same part
+
+
 @dataclass(frozen=True)
 class Window:
     """The frames that are scored, `first` to `last`, both included, counted from 0; None for no bound."""
@@ -140,7 +143,7 @@ def compare_files(match: Match, wanted: Wanted) -> Comparison:
         report_confidence=said.report_confidence,
         beyond=_beyond(main, true),
         group=match.group,
-        notes=(*said.notes, *_notes(main, true, pairs), *_of_part(said, window)),
+        notes=(*said.notes, *_notes(main, true, pairs), *_of_part(said, main, window)),
     )
 
 
@@ -221,9 +224,13 @@ def _refuse_other_sizes(said: Result, true: Truth) -> None:
         )
 
 
-def _of_part(said: Result, window: Window) -> list[str]:
+def _of_part(said: Result, compared: Compared, window: Window) -> list[str]:
     """That a run of a part of the video is held against the whole truth."""
-    if not said.part or window != Window():
+    if not said.part or window != Window() or said.tracks is None or not len(said.tracks):
+        return []
+    first, last = int(said.tracks.frames.min()), int(said.tracks.frames.max())
+    true = compared.truth.frames
+    if not len(true) or (true.min() >= first - _NEAR and true.max() <= last + _NEAR):
         return []
     return [
         f"{said.path} is of a part of the video ({said.part}), and what is true of the rest counts as missed; "

@@ -14,6 +14,7 @@ from perdure.errors import FormatError, ParameterError
 from perdure.files.networks import ENGINES, read_class_names, read_network
 from perdure.files.regions import read_regions
 from perdure.files.shapes import is_file
+from perdure.params import unknown_name
 
 AnyDetector = str | Path | Callable[[Any], Any]
 OWN = "own"  # the name of a detector that is given as an object with `start` and `step`
@@ -41,6 +42,8 @@ def detector_name(detector: AnyDetector | None) -> str:
         return engine
     if word in _NAMED:
         return word
+    if colon and engine.isalnum() and len(engine) > 1 and file and "://" not in word:
+        raise ParameterError(f"--detector {word}: {unknown_name('kind of network', engine, ENGINES)}")
     ending = Path(word).suffix.lower()
     if ending in (".onnx", ".xml"):
         engine = "onnx" if ending == ".onnx" else "openvino"

@@ -202,11 +202,13 @@ class Corrections:
             said, number = one.new, later
 
     def event(self, event: Event, number: int) -> Event:
-        """Return an event of report `number` with its settled ids."""
+        """Return an event of report `number` with its settled ids; none where it was of several, who are one or gone."""
         if not self.by_id:
             return event
         ids = dict.fromkeys(self.identity(one, event.begin, number) for one in event.ids)
-        return replace(event, ids=tuple(one for one in ids if one))
+        left = tuple(one for one in ids if one)
+        alone = len(left) < 2 <= len(set(event.ids))  # of several, of whom one is left, nothing has happened
+        return replace(event, ids=() if alone else left)
 
     def settled(self, frame: int, said: list[tuple[int, Tracks]]) -> Iterator[tuple[int, Tracks]]:
         """Yield (frame, rows), one per id: of two, the one seen before the one inferred, then the surer, then the later."""

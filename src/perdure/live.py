@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from perdure.files.live_source import LiveSource
 from perdure.files.memory import memory
 from perdure.files.rolling import Rolling
 from perdure.fold import Step
-from perdure.types import Report
+from perdure.pipeline import Plan
+from perdure.types import Frame, Report
 
 _OVER = 10.0  # s over which rates and latencies are told
 
@@ -73,6 +76,17 @@ class Vital:
             "memory_mb": memory(),
             "seconds": round(now - self.begun, 1),
         }
+
+
+def warmed(made: Plan) -> None:
+    """Load and compile what a run needs, on pictures of nothing, so that the first real frames do not wait for it."""
+    blank = np.zeros((made.scene.height, made.scene.width, 3), np.uint8)
+    frames = [Frame(k, k / made.scene.fps, blank) for k in range(2)]
+    spot = blank.copy()
+    spot[made.scene.height // 3 : made.scene.height // 2, made.scene.width // 3 : made.scene.width // 2] = 255
+    frames += [Frame(k, k / made.scene.fps, spot) for k in range(2, 6)]
+    for _ in made.steps(frames):
+        pass
 
 
 def followed(

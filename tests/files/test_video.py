@@ -537,7 +537,7 @@ def test_what_is_no_source_is_refused(wrong: object) -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"a.mp4": 1}, "a dict is no source: give a file, a folder, "),
+        ({"a.mp4": 1}, "a table is no source: give a file, a folder, "),
         ({1, 2}, "a set is no source"),
         (b"a.mp4", "bytes is no source"),
         (bytearray(b"a.mp4"), "a bytearray is no source"),

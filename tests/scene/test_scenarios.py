@@ -12,7 +12,8 @@ from perdure.fold import Corrections, coherent, settle
 from perdure.interpret import Feedback, Interpreter, over_run
 from perdure.scene.advice import Advice
 from perdure.scene.counting import Line
-from perdure.scene.scenarios import Bounds, Rules, Scenario
+from perdure.scene.scenarios import Bounds, Recognition, Rules, Scenario
+from perdure.scene.scenarios.lasting import Hold
 from perdure.scene.zones import Zone, rectangle
 from perdure.states import load, save
 from perdure.trackers import TRACKERS
@@ -210,6 +211,14 @@ def test_who_is_hidden_while_two_are_together_is_still_with_the_other():
 
     world = World((Block(path), Block(walk((62, 30), (0, 0)), colour=BLUE)), count=80, width=130)
     assert events(world, OWN["meets"], seen=boxes_of(world)) == [("meets", 20, 79, (1, 2), "")]
+
+
+def test_two_pairs_that_turn_out_to_be_one_have_met_once():
+    old = Hold("meets", 1, 2, "", 5, 0.5, 30, 3.0, True, False, 1.0)
+    new = Hold("meets", 2, 3, "", 12, 1.2, 30, 3.0, True, False, 1.0)
+    own = Hold("meets", 1, 3, "", 20, 2.0, 30, 3.0, True, False, 1.0)
+    after = Recognition(holds=(own, new, old)).renamed({3: 1})
+    assert [(one.id, one.other, one.begin) for one in after.holds] == [(1, 2, 5)]
 
 
 def test_a_scenario_may_come_after_another():

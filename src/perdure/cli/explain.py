@@ -113,7 +113,8 @@ def _without_reasons(about: dict[str, Any]) -> str:
         again = "track again with --explain" if not parameters["explain"] else "no link was made"
         return f"the run holds no reasons of links; {again}"
     return (
-        f"the tracker {name or 'of this run'} puts down no reasons of links; only its events tell what it decided"
+        f"the tracker {name or 'of this run'} puts down no reasons of links; only its events tell what it decided, "
+        "those of one target with --id"
     )
 
 

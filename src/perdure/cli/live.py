@@ -15,16 +15,18 @@ from perdure.cli import options
 from perdure.cli.stopping import Ending
 from perdure.cli.track import about_run
 from perdure.detect import DETECTORS
-from perdure.errors import ParameterError
+from perdure.detection import detector_name, file_of
+from perdure.errors import FormatError, ParameterError
 from perdure.files.live_events import LiveEvents, lines_to
 from perdure.files.live_source import LiveSource, Patience, open_live
 from perdure.files.rolling import Rolling, check_place
 from perdure.files.runs import Reporting
+from perdure.files.scenarios import read_rules
 from perdure.files.span import seconds_of
 from perdure.files.webhook import Webhook
 from perdure.fold import Step
 from perdure.interpret import Feedback
-from perdure.live import Vital, followed
+from perdure.live import Vital, followed, warmed
 from perdure.pipeline import plan
 from perdure.trackers import TRACKERS
 from perdure.types import Frame
@@ -76,6 +78,12 @@ def live(
     class_: options.ClassOption = None,
     context: options.ContextOption = None,
     fps: options.FpsOption = None,
+    wait: Annotated[
+        bool,
+        typer.Option(
+            "--wait", help="Wait for a source that cannot be reached yet, until --give-up; else that ends it."
+        ),
+    ] = False,
     parameters: options.ParametersOption = None,
     events: Annotated[
         str | None,
@@ -105,10 +113,18 @@ def live(
     given = options.read_parameters(parameters, chosen)
     reporting = _taken(given, Reporting)
     every, limit = seconds_of(roll, "roll"), None if until is None else seconds_of(until, "for")
+    if limit == 0:
+        raise ParameterError("for = 0 leaves nothing to follow; leave it out to go on for ever")
+    if health is not None and not 0 <= health < 65536:
+        raise ParameterError(f"health = {health} is no port: it must be 0 to 65535")
+    rules = None if scenarios is None else read_rules(scenarios)  # before the camera is asked
+    detector_name(detector)
+    if (file := file_of(detector)) is not None and not file.is_file():
+        raise FormatError(f"{file}: there is no such file")
     hook = None if webhook is None else Webhook(webhook)
     if output is not None:
         check_place(output)
-    opened = open_live(source, fps=fps, patience=_taken(given, Patience))
+    opened = open_live(source, fps=fps, patience=_taken(given, Patience), wait=wait)
     try:
         made = plan(
             opened,
@@ -117,7 +133,7 @@ def live(
             roi=roi,
             calibration=calibration,
             zones=zones,
-            scenarios=scenarios,
+            scenarios=rules,
             classes=class_ or (),
             context=context or None,
             parameters=given,
@@ -128,6 +144,8 @@ def live(
         vital = Vital(opened)
         with _served(health, vital) as url, Ending() as ending:
             print(f"perdure: following {opened.origin} into {place}{url}; Ctrl-C ends it", file=sys.stderr)
+            opened.told = _say
+            warmed(made)
             told = _told(events is not None, hook, opened)
             frames = ending.frames(_limited(opened, limit))
             try:
@@ -140,6 +158,10 @@ def live(
         if hook is not None:
             hook.close()
     _close(vital, rolling, hook, ending)
+
+
+def _say(text: str) -> None:
+    print(f"perdure: {text}", file=sys.stderr)
 
 
 def _taken(given: dict[str, object], kind: type[Any]) -> Any:
@@ -192,10 +214,10 @@ def _close(vital: Vital, rolling: Rolling, hook: Webhook | None, ending: Ending)
         print(f"perdure: note: {text}", file=sys.stderr)
     if hook is not None and hook.dropped:
         print(f"perdure: note: {hook.dropped} events could not be posted ({hook.why})", file=sys.stderr)
-    words = (
-        f"{figures['frames']} frames, {figures['dropped']} dropped, {figures['connections']} connections, "
-        f"{figures['events']} events, {rolling.begun} run folders in {rolling.place}"
-    )
+    counts = (("frame", "frames"), ("connection", "connections"), ("event", "events"))
+    parts = [f"{figures[many]} {one if figures[many] == 1 else many}" for one, many in counts]
+    parts.insert(1, f"{figures['dropped']} dropped")
+    words = f"{', '.join(parts)}, {rolling.begun} run folder{'' if rolling.begun == 1 else 's'} in {rolling.place}"
     print(f"perdure: {words}", file=sys.stderr)
     if ending.damage is not None:
         print(f"perdure: {ending.damage}", file=sys.stderr)

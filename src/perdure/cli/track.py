@@ -7,6 +7,7 @@ import dataclasses
 import json
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -285,6 +286,9 @@ def show(outcome: Outcome, folder: RunFolder, *, as_json: bool) -> None:
         return
     print(f"frames   {outcome.frames}, tracked in {outcome.seconds:.1f} s ({outcome.rate:.0f} frames/s)")
     print(f"tracks   {outcome.totals.tracks} ({outcome.totals.rows} rows), {outcome.totals.events} events")
+    told = Counter(one.kind for one in folder.scenario_events())
+    if told:
+        print(f"told     {', '.join(f'{count} {kind}' for kind, count in sorted(told.items()))}")
     print(f"results  {folder.path / 'tracks.txt'}")
     if outcome.has_film:
         drawn = f"  (drawn in {outcome.film_seconds:.1f} s)" if outcome.film_seconds else ""

@@ -86,13 +86,13 @@ def _whole(folder: Path, is_ours: Callable[[Path], bool]) -> Iterator[Path]:
 def _refuse(folder: Path, is_ours: Callable[[Path], bool], what: str, *, overwrite: bool) -> None:
     try:
         if folder.exists() and not folder.is_dir():
-            raise OutputError(f"{folder} is a file; name a folder with -o")
+            raise OutputError(f"{folder} is a file; name a folder")
         there = sorted(folder.iterdir()) if folder.is_dir() else []
     except OSError as error:
         raise cannot_write(folder, error) from error
     others = [one.name for one in there if not is_ours(one)]
     if others:
-        raise OutputError(f"{folder} holds other files ({others[0]}); name a new folder with -o")
+        raise OutputError(f"{folder} holds other files ({others[0]}); name a new folder")
     if there and not overwrite:
         raise OutputError(f"{folder} holds {what} already; add --overwrite or name another folder with -o")
 

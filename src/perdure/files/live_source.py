@@ -103,6 +103,7 @@ class LiveSource:
         self._begun = self._lost = 0.0
         self._last = -1.0
         self._next = 0
+        self.told: Callable[[str], None] = lambda text: None
         first = self.reach()
         self.name, self.origin, self.fps = first.name, first.origin, first.fps
         self.width, self.height = first.width, first.height
@@ -212,6 +213,7 @@ class LiveSource:
             with self._condition:
                 self.counts.connected, self.counts.why = False, why
                 self._why = why
+            self.told(f"the connection to {self.name} was lost ({why}); it is tried again")
 
     def _connected(self, now: float) -> None:
         with self._condition:
@@ -219,6 +221,7 @@ class LiveSource:
                 gap = now - self._lost
                 self.counts.away += gap
                 why = f"{self._why}; back after {gap:.1f} s"
+                self.told(f"{self.name} is back after {gap:.1f} s")
                 self._events.append(Event("gap", self._next, self._next, why=why))
             else:
                 self._begun = now
@@ -268,13 +271,15 @@ class LiveSource:
             self._condition.notify_all()
 
 
-def open_live(source: str, *, fps: float | None = None, patience: Patience | None = None) -> LiveSource:
-    """Open a camera's number or a stream's URL as a live source.
+def open_live(
+    source: str, *, fps: float | None = None, patience: Patience | None = None, wait: bool = False
+) -> LiveSource:
+    """Open a camera's number or a stream's URL as a live source; with `wait`, try until it can be reached.
 
     Raises
     ------
     VideoError
-        If it cannot be reached now.
+        If it cannot be reached now; waiting, if it is given up.
     ParameterError
         If it is neither.
     """
@@ -284,7 +289,21 @@ def open_live(source: str, *, fps: float | None = None, patience: Patience | Non
     span = read_span(None, None, 1)
     wanted = patience or Patience()
     if "://" in source:
-        return LiveSource(lambda: open_url(source, fps, span, wanted.silence), wanted)
+        return _first_reached(lambda: open_url(source, fps, span, wanted.silence), wanted, wait=wait)
     if source.isascii() and source.isdigit():
-        return LiveSource(lambda: open_camera(int(source), fps, span), wanted)
+        return _first_reached(lambda: open_camera(int(source), fps, span), wanted, wait=wait)
     raise ParameterError(f"{source} is neither a camera's number nor a URL; `perdure track` follows files")
+
+
+def _first_reached(reach: Callable[[], Passing], patience: Patience, *, wait: bool) -> LiveSource:
+    """The source, as soon as it can be reached."""
+    begun, pause = time.monotonic(), _SOONEST
+    while True:
+        try:
+            return LiveSource(reach, patience)
+        except VideoError:
+            late = patience.give_up and time.monotonic() - begun > patience.give_up
+            if not wait or late:
+                raise
+        time.sleep(pause)
+        pause = min(2 * pause, _LATEST)

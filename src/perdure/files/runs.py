@@ -120,6 +120,11 @@ class RunFolder:
         FormatError
             If there is none.
         """
+        inside = sorted(one.parent for one in path.glob("*/tracks.jsonl")) if path.is_dir() else []
+        if not (path / "tracks.jsonl").is_file() and inside:
+            raise FormatError(
+                f"{path} is not a run folder, but holds {len(inside)}; name one of them, such as {inside[-1]}"
+            )
         if not (path / "tracks.jsonl").is_file():
             raise FormatError(f"{path} is not a run folder (no tracks.jsonl in it); `perdure track` makes one")
         return RunFolder(path)

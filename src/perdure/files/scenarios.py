@@ -81,7 +81,7 @@ def rules_of(text: str, place: str) -> Rules:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise FormatError(f"{place} is not TOML: {error}") from error
     if unknown := next((one for one in given if one not in _TABLES), None):
-        raise FormatError(f"{place}: {unknown_name('table', unknown, _TABLES)}")
+        raise FormatError(f"{place}: {unknown_name('table or key of the file', unknown, _TABLES)}")
     try:
         if not isinstance(given.get("usual", False), bool):
             raise ParameterError(
@@ -169,7 +169,9 @@ def _flag(key: str, value: object) -> bool:
 
 
 def _bounds(key: str, value: object) -> Bounds:
-    if not isinstance(value, dict) or not value or not set(value) <= {"above", "below"}:
+    if isinstance(value, dict) and (wrong := next((one for one in value if one not in ("above", "below")), None)):
+        raise ParameterError(f"{key}: {unknown_name('end of a range', str(wrong), ('above', 'below'))}")
+    if not isinstance(value, dict) or not value:
         raise ParameterError(
             f"{key} = {shown(value)} must be a range, such as {{above = 1.5}} or {{above = 1, below = 2}}"
         )

@@ -98,7 +98,7 @@ def shown(value: object) -> str:
     """Return a value as a message of one line may show it, cut where it is long.
 
     >>> shown(True), shown("a film"), shown({}), shown(2.5)
-    ('true', "'a film'", 'a dict', '2.5')
+    ('true', "'a film'", 'a table', '2.5')
     """
     if isinstance(value, (str, Path)):
         return f"'{cut(str(value))}'"
@@ -108,7 +108,7 @@ def shown(value: object) -> str:
         return "a number of more than 18 digits"
     if isinstance(value, Real):
         return str(value) if isinstance(value, Integral) else f"{float(value):g}"
-    kind = type(value).__name__
+    kind = "table" if isinstance(value, dict) else type(value).__name__
     return kind if kind == "bytes" else f"an {kind}" if kind[:1].lower() in "aeiou" else f"a {kind}"
 
 

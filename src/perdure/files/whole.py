@@ -42,9 +42,9 @@ def refuse_existing(path: Path, *, overwrite: bool) -> None:
         If it is there and `overwrite` is not asked, or if it is a folder.
     """
     if path.is_dir():
-        raise OutputError(f"{path} is a folder; name a file with -o")
+        raise OutputError(f"{path} is a folder; name a file")
     if path.exists() and not overwrite:
-        raise OutputError(f"{path} is there already; add --overwrite or name another file with -o")
+        raise OutputError(f"{path} is there already; add --overwrite, or name another file")
 
 
 def cannot_write(path: Path, error: OSError) -> OutputError:

@@ -260,7 +260,7 @@ USUAL: Mapping[str, Kind] = {
         frozenset({"vehicle", "car", "truck", "bus", "van", "motorcycle", "motorbike", "bicycle", "train"}),
     ),
     "animal": Kind(
-        (_look(ratio=(0.15, 0.3, 3.0, 6.0), height=(0.02, 0.1, 1.2, 1.8), size=(0.0, 0.004, 0.5, 1.0)),),
+        (_look(ratio=(0.15, 0.3, 1.8, 3.5), height=(0.02, 0.1, 1.2, 1.8), size=(0.0, 0.004, 0.5, 1.0)),),
         frozenset(
             {
                 "animal",

@@ -181,7 +181,7 @@ WRONG = [
         video(images=[{"id": 1, "width": 65000, "height": 65000}]),
         "a picture of 65000x65000 is too large",
     ),
-    ("a.json", video(annotations={}), "'annotations' must be a list, not a dict"),
+    ("a.json", video(annotations={}), "'annotations' must be a list, not a table"),
     ("a.json", video(annotations=[3]), "annotations 1: wanted is an object, not 3"),
     ("a.json", video()[:-9], "line 1: not JSON .*is the file whole"),
     ("a.json", "[" * 100_000, "nested too deep"),

@@ -360,7 +360,9 @@ def test_a_sequence_of_motchallenge_brings_its_size_and_rate(tmp_path: Path):
     assert (found.size, found.fps, found.frames) == ((480, 640), 10, (0, 1, 2, 3, 4))
     assert found.tracks.times.tolist() == [0, 0.1]
     assert found.tracks.classes.tolist() == ["pedestrian", "distractor"]
-    assert found.notes == ("rows that the truth does not ask for (flag 0), here of confidence 0: 1",)
+    assert found.notes == (
+        "rows that the truth does not ask for (flag 0), here of confidence 0: 1; of another format `score` asks for them, too",
+    )
 
 
 def test_what_pandas_writes_of_tracks_is_read(yard: Content, tmp_path: Path):

@@ -48,8 +48,10 @@ def read(path: Path, reading: Reading) -> Content:
     if len(tracks) and protocol_of(table) == "mot17":
         words = np.array(["", *CLASSES])
         tracks = tracks.replace(classes=words[table.column(7, 0).astype(int)])
-        aside = int(np.count_nonzero(tracks.confidence == 0))
-        notes = (f"rows that the truth does not ask for (flag 0), here of confidence 0: {aside}",) if aside else ()
+    flags = np.isin(tracks.confidence, (0.0, 1.0)).all()  # a truth: 0 is what is not asked for
+    if aside := int(np.count_nonzero(tracks.confidence == 0)) if flags else 0:
+        what = "rows that the truth does not ask for (flag 0), here of confidence 0"
+        notes = (f"{what}: {aside}; of another format `score` asks for them, too",)
     content = Content(ordered(tracks), notes=notes)
     about = text.parent.parent if text.parent.name == "gt" else text.parent
     return _with_sequence(content, about / SEQUENCE) if path.is_dir() else content

@@ -47,7 +47,8 @@ def paired(
             if distance >= scenario.apart:
                 pairs.pop(key, None)
                 if one.together and scenario.on == "parts":
-                    why = f"together for {moment.time - one.since:.1f} s"
+                    since = max(one.since, *(moment.lives[part].born for part in ids))
+                    why = f"together for {moment.time - since:.1f} s"
                     parted.append(Event(scenario.name, moment.frame, moment.frame, ids, "", belief, why))
                 continue
             if distance <= scenario.near and one.near < 0:

@@ -31,11 +31,30 @@ class Recognition:
         def of(one: int) -> int:
             return names.get(one, one)
 
+        def pair(ids: tuple[int, int]) -> tuple[int, int]:
+            one, other = sorted(map(of, ids)) if all(ids) else map(of, ids)
+            return one, other
+
+        if not names:
+            return self
+        holds: dict[object, Hold] = {}
+        for hold in sorted(
+            self.holds, key=lambda one: one.begin
+        ):  # of two that are one now, the one that began first
+            ids = pair((hold.id, hold.other))
+            if ids[0] != ids[1]:
+                key = (hold.scenario, *ids, hold.zone, hold.over)
+                holds.setdefault(key, replace(hold, id=ids[0], other=ids[1]))
+        pairs: dict[object, Pair] = {}
+        for two in sorted(self.pairs, key=lambda one: one.since):
+            ids = pair(two.ids)
+            if ids[0] != ids[1]:
+                pairs.setdefault((two.scenario, ids), replace(two, ids=ids))
         return Recognition(
-            tuple(replace(one, id=of(one.id), other=of(one.other)) for one in self.holds),
+            tuple(holds.values()),
             tuple(replace(one, id=of(one.id)) for one in self.sides),
             tuple(replace(one, id=of(one.id)) for one in self.crossings),
-            tuple(replace(one, ids=(of(one.ids[0]), of(one.ids[1]))) for one in self.pairs),
+            tuple(pairs.values()),
             tuple(replace(one, id=of(one.id), owner=of(one.owner)) for one in self.things),
         )
 

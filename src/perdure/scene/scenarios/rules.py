@@ -30,6 +30,7 @@ PAIRS = ("meets", "parts")
 THINGS = ("leaves-behind", "takes-away")
 PLACES = ("enters", "leaves")
 ANY = "*"
+RESERVED = ("entered", "left", "lost", "found_again", "noise", "believed", "gap", "exchanged", "merge", "split")
 LONGEST = 60.0  # s: what may be asked of a life's past
 
 
@@ -121,6 +122,10 @@ class Scenario:
         """Refuse what cannot be meant."""
         if not self.name or not self.name.replace("_", "").replace("-", "").isalnum():
             raise ParameterError(f"name = {self.name!r} must be letters, digits, - and _")
+        if self.name in RESERVED:
+            raise ParameterError(f"name = {self.name!r} is what trackers call an event of theirs; take another")
+        if self.after == self.name:
+            raise ParameterError("after = its own name: a scenario cannot come after itself")
         if self.on not in TRIGGERS:
             raise ParameterError(unknown_name("trigger (on)", self.on, TRIGGERS))
         for name, low, high in (
@@ -191,4 +196,4 @@ class Rules:
                         if zones
                         else f"there is no zone {zone!r}: no zones are given"
                     )
-                    raise ParameterError(f"scenario {one.name}: {there}; zones are named with --zones")
+                    raise ParameterError(f"scenario {one.name}: {there} (zones are named with --zones)")
