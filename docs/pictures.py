@@ -1,6 +1,6 @@
-"""Make the pictures of the README and of docs/viewer.md: `python docs/pictures.py` writes docs/images.
+"""Make the pictures of the README, of the example and of docs/viewer.md: `python docs/pictures.py` writes docs/images.
 
-Those of the viewer need Chromium and Playwright; without them only docs/images/demo.png is made.
+Those of the viewer need Chromium and Playwright; without them only demo.png and trails.png are made.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 import av
 import cv2
 import numpy as np
+from site_pages import NOTEBOOK, code_of
 
 from perdure.files.film import save_png
 
@@ -26,8 +27,10 @@ PERDURE = [sys.executable, "-c", "from perdure.cli import main; main()"]
 
 
 def main() -> None:
-    """Track the demo film, lay four of its frames side by side, and look at the run in the viewer."""
+    """Run the example; track the demo film, lay four of its frames side by side, look at the run in the viewer."""
     with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-c", code_of(NOTEBOOK)], cwd=folder, check=True)
+        shutil.move(Path(folder) / "trails.png", IMAGES / "trails.png")
         subprocess.run([*PERDURE, "demo", "-o", folder], check=True)
         with av.open(str(Path(folder) / "run/tracked.mp4")) as film:
             frames = enumerate(film.decode(video=0))

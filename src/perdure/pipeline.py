@@ -404,6 +404,8 @@ def track(source: AnySource, **options: Any) -> Tracks:
 def follow(source: AnySource, **options: Any) -> Iterator[fold.Step]:
     """Yield (frame, regions, report) as each frame comes, for live use; options as for `track`.
 
+    Examples
+    --------
     >>> blank = np.zeros((48, 64, 3), np.uint8)
     >>> [len(step.report.rows) for step in follow([blank, blank])]
     [0, 0, 0]
