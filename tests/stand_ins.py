@@ -33,6 +33,7 @@ def stand_ins(place: Path) -> Path:
     write_film(place / "street.mp4", world)
     write_film(place / "clip.mp4", square(SHORT))
     os.link(place / "street.mp4", place / "yard.mp4")
+    os.link(place / "clip.mp4", place / "dish.mp4")
     boxes_and_truths(place, truth)
     masks(place)
     places(place)
