@@ -19,6 +19,7 @@ class Command(NamedTuple):
     page: str
     line: int
     words: tuple[str, ...]
+    block: int = 0  # the line at which its block begins
 
     def __str__(self) -> str:
         """Where it stands, and what is typed."""
@@ -32,7 +33,7 @@ def typed(page: Path) -> list[Command]:
         if block[1] == "sh":
             first = text[: block.start(2)].count("\n") + 1
             for number, line in enumerate(block[2].replace("\\\n", "  ").splitlines()):
-                found += [Command(page.name, first + number, words) for words in parts(line)]
+                found += [Command(page.name, first + number, words, first) for words in parts(line)]
     return found
 
 

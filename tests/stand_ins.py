@@ -15,6 +15,7 @@ from networks import network
 
 from perdure.demo import Walker, World
 from perdure.demo.figures import Clothes
+from perdure.detect.coco import COCO
 from perdure.files.film import Film, save_png
 from perdure.files.mot import write_rows
 from perdure.types import Tracks
@@ -43,15 +44,21 @@ def stand_ins(place: Path) -> Path:
 
 
 def square(count: int) -> World:
-    """Nine people in three rows, smaller farther off, who walk to and fro through the whole film."""
+    """Nine people in three rows, smaller farther off: two come in at the left in front, two go out there behind."""
+    rows = (  # the feet, how tall, how far each comes in the long film, where each begins
+        (110, 115.0, 150, (60, 230, 400)),
+        (212, 115.0, -220, (60, 150, 420)),
+        (345, 115.0, 260, (-40, -150, 300)),
+    )
     walkers = []
-    for row, (foot, tall, way) in enumerate(((110, 60.0, 70), (215, 95.0, -80), (345, 140.0, 90))):
-        for k, start in enumerate((60, 250, 440)):
-            path = ((0.0, start - way, foot), (LONG / FPS, start + way * 1.6, foot))
+    for row, (foot, tall, way, starts) in enumerate(rows):
+        for k, start in enumerate(starts):
             shirt = (60 + 60 * k, 200 - 70 * row, 40 + 80 * ((k + row) % 3))
-            walkers.append(Walker("person", path, 0.36 * tall, tall, Clothes(shirt, (40, 40 + 40 * row, 90))))
+            clothes = Clothes(shirt, (40, 40 + 40 * row, 90))
+            path = ((0.0, start, foot), (LONG / FPS, start + way, foot))
+            walkers.append(Walker("person", path, 0.36 * tall, tall, clothes))
     return World(
-        WIDTH, HEIGHT, fps=FPS, count=count, walkers=tuple(walkers), backdrop="square", horizon=30.0, noise=2.0
+        WIDTH, HEIGHT, fps=FPS, count=count, walkers=tuple(walkers), backdrop="square", horizon=-180.0, noise=2.0
     )
 
 
@@ -93,7 +100,7 @@ def places(place: Path) -> None:
         "type": "FeatureCollection",
         "features": [
             _zone("ground", "bus stop", stop),
-            _zone("entry", "gate", [[0, 0], [60, 0], [60, 360], [0, 360]]),
+            _zone("ground", "gate", [[0, 0], [60, 0], [60, 360], [0, 360]]),
         ],
     }
     for name in ("street.json", "yard.json"):
@@ -116,7 +123,7 @@ def detectors(place: Path) -> None:
     """A YOLOX that sees nothing sure, and the same for OpenVINO."""
     output = {"output": np.full((1, CELLS, 85), 0.01, np.float32)}
     drawn = network(place / "yolox_nano.onnx", output, shape=(1, 3, 416, 416))
-    (place / "names.txt").write_text("person\n", encoding="utf-8")
+    (place / "names.txt").write_text("\n".join(COCO) + "\n", encoding="utf-8")
     try:
         import openvino
     except ImportError:
