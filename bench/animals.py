@@ -5,9 +5,8 @@
 *grey* is a function: regions are what is brighter than 40 (flies) or darker than 125 (fish) and has 800 or 150 pixels
 and more, each picture by itself; *background* is the usual detector. *All there* is the share of frames in which as many
 are said as there are animals, ids those of rows that count. IDSW, HOTA and IDF1 where the truth has identities (of the
-flies; its boxes are those of key points, without the ends of legs and wings). Frames a second with everything, on this
-machine. The data is read from $PERDURE_DATA or ../shared/data beside the repository. --write puts the table into
-docs/animals.md, --json prints everything as one object in the last line.
+flies; its boxes are drawn round key points). The data is read from $PERDURE_DATA or ../shared/data beside the repository.
+--write puts the table into docs/animals.md, --json prints everything as one object in the last line.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import argparse
 import json
 import os
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -81,7 +79,6 @@ class Told:
     switches: int | None
     hota: float | None
     idf1: float | None
-    rate: float  # frames a second
 
 
 def main() -> None:
@@ -112,25 +109,23 @@ def measure(data: Path, name: str, detector: str, tracker: str) -> Told:
     """Track a film and count."""
     film = FILMS[name]
     seen: str | Callable[[Image], Regions] = film.regions if detector == "grey" else detector
-    begun = time.perf_counter()
     frames, reports = 0, []
     for frame, _, report in perdure.follow(str(data / film.place), detector=seen, tracker=tracker):
         frames += frame is not None
         reports.append(report)
     tracks = perdure.settle(reports).counted()
-    seconds = time.perf_counter() - begun
     there = np.bincount(tracks.frames, minlength=frames)  # rows of each frame
     figures = score(tracks, read_truth(data / film.truth)).figures if film.truth else {}
     return Told(
         name, detector, tracker, film.animals, len(np.unique(tracks.ids)),
         float((there == film.animals).mean()),
-        figures.get("IDSW"), figures.get("HOTA"), figures.get("IDF1"), frames / seconds,
+        figures.get("IDSW"), figures.get("HOTA"), figures.get("IDF1"),
     )  # fmt: skip
 
 
 def table(told: list[Told]) -> Table:
     """The figures of all runs."""
-    heads = ["film", "regions", "tracker", "animals", "ids", "all there", "IDSW", "HOTA", "IDF1", "frames/s"]
+    heads = ["film", "regions", "tracker", "animals", "ids", "all there", "IDSW", "HOTA", "IDF1"]
     return Table("Films from above", heads, [_row(one) for one in told])
 
 
@@ -140,7 +135,7 @@ def _row(one: Told) -> list[str]:
 
     switches = "–" if one.switches is None else str(one.switches)
     counts = [str(one.animals), str(one.ids), f"{100 * one.all_there:.0f} %", switches]
-    return [one.film, one.detector, one.tracker, *counts, share(one.hota), share(one.idf1), f"{one.rate:.0f}"]
+    return [one.film, one.detector, one.tracker, *counts, share(one.hota), share(one.idf1)]
 
 
 def _arguments() -> argparse.Namespace:
