@@ -1,7 +1,8 @@
 """Saving and loading states: a versioned zip of one JSON tree and its arrays, never a pickle.
 
 A state is a frozen dataclass of arrays, numbers, words, tuples, dicts and other such dataclasses.
-Loading follows the types that the class declares, so that a file can name no code.
+Loading follows the types that the class declares, so that a file can name no code. Nothing is packed, so that no file
+unfolds into more than its own size.
 
 Examples
 --------
@@ -21,12 +22,13 @@ import dataclasses
 import enum
 import io
 import json
+import math
 import types
 import typing
 import zipfile
 import zlib
 from collections.abc import Mapping
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import IO, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,21 +49,33 @@ def save(state: object) -> bytes:
     StateError
         If the state holds something that is not data.
     """
+    out = io.BytesIO()
+    write(state, out)
+    return out.getvalue()
+
+
+def write(state: object, file: IO[bytes]) -> None:
+    """Write the bytes of `save` into a file that is open and can be sought in, without a copy of them in memory.
+
+    Raises
+    ------
+    StateError
+        If the state holds something that is not data; nothing is written then.
+    """
     arrays: list[NDArray[Any]] = []
     tree = _pack(state, arrays)
     header = {"format": FORMAT, "version": VERSION, "kind": type(state).__qualname__, "tree": tree}
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
-        archive.writestr(zipfile.ZipInfo("state.json", _EPOCH), json.dumps(header, separators=(",", ":")))
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr(zipfile.ZipInfo(_TREE, _EPOCH), json.dumps(header, separators=(",", ":")))
         for number, array in enumerate(arrays):
-            data = io.BytesIO()
-            np.lib.format.write_array(data, np.asarray(array, order="C"), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{number}.npy", _EPOCH), data.getvalue())
-    return out.getvalue()
+            with archive.open(zipfile.ZipInfo(f"{number}.npy", _EPOCH), "w", force_zip64=True) as entry:
+                _write_array(entry, array)
 
 
 def load(data: bytes, kind: type[S]) -> S:
     """Return the state that `save` wrote, independent of every other; its arrays are writable.
+
+    A generic dataclass is given with the types of its parts: `Pair[Walk, Swim]`.
 
     Raises
     ------
@@ -70,18 +84,71 @@ def load(data: bytes, kind: type[S]) -> S:
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            header = json.loads(archive.read("state.json"))
+            _check_size(archive, len(data))
+            header = json.loads(archive.read(_TREE))
             _check_header(header, kind)
-            names = archive.namelist()
-            arrays = [
-                np.lib.format.read_array(io.BytesIO(archive.read(f"{number}.npy")), allow_pickle=False)
-                for number in range(len(names) - 1)
-            ]
-        return typing.cast(S, _unpack(header["tree"], kind, arrays))
+            count = len(archive.namelist()) - 1
+            arrays = [_read_array(archive.read(f"{number}.npy")) for number in range(count)]
+        return cast(S, _unpack(header["tree"], kind, arrays))
     except StateError:
         raise
     except _DAMAGE as error:
         raise StateError(f"this saved state is damaged ({error}); start the run anew") from error
+
+
+def kind_of(part: Any) -> Any:
+    """Return the type of the state of a tracker or detector, for `load`: its own `state_kind`, or what `start` returns.
+
+    Raises
+    ------
+    StateError
+        If it says neither.
+    """
+    own = getattr(part, "state_kind", None)
+    kind = get_type_hints(type(part).start).get("return") if own is None else own
+    if not dataclasses.is_dataclass(get_origin(kind) or kind):
+        raise StateError(f"{type(part).__name__} does not say what its state is; `start` must return a dataclass")
+    return kind
+
+
+def layout(kind: Any) -> str:
+    """Return the fields of a kind of state and of all that it holds, in words: another layout is another version."""
+    known: dict[str, str] = {}
+    _lay_out(kind, known)
+    return "; ".join(f"{name}({fields})" for name, fields in sorted(known.items()))
+
+
+_TREE = "state.json"
+
+
+def _check_size(archive: zipfile.ZipFile, size: int) -> None:
+    """Refuse an archive that would unfold: entries that are packed, lie over each other, or say more than is there."""
+    entries = archive.infolist()
+    packed = any(one.compress_type != zipfile.ZIP_STORED or one.file_size != one.compress_size for one in entries)
+    if packed or sum(one.file_size for one in entries) > size:
+        raise StateError("this saved state is damaged (it is larger inside than outside); start the run anew")
+
+
+def _write_array(entry: IO[bytes], array: NDArray[Any]) -> None:
+    """An array as in a `.npy` file."""
+    array = np.asarray(array, order="C")
+    if array.dtype.hasobject:
+        raise StateError("a state cannot hold an array of objects: only of numbers and words")
+    np.lib.format.write_array_header_1_0(entry, np.lib.format.header_data_from_array_1_0(array))
+    if array.size:
+        entry.write(array.reshape(-1).view(np.uint8).data)
+
+
+def _read_array(content: bytes) -> NDArray[Any]:
+    """The array of a `.npy` file; ValueError where it says another size than it has, before it takes room."""
+    file = io.BytesIO(content)
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise ValueError("an array of an unknown version")
+    shape, in_columns, kind = np.lib.format.read_array_header_1_0(file)
+    count = math.prod(shape)
+    if kind.hasobject or in_columns or count * kind.itemsize != len(content) - file.tell():
+        raise ValueError("an array that is not what it says")
+    return np.ndarray(shape, kind, content, file.tell()).copy()
 
 
 _DAMAGE = (
@@ -106,10 +173,9 @@ def _check_header(header: Any, kind: type) -> None:
         raise StateError(
             f"this state has version {header.get('version')}, this Perdure reads version {VERSION}; start the run anew"
         )
-    if header.get("kind") != kind.__qualname__:
-        raise StateError(
-            f"this state is of {header.get('kind')}, not of {kind.__qualname__}; name the same tracker"
-        )
+    name = (get_origin(kind) or kind).__qualname__
+    if header.get("kind") != name:
+        raise StateError(f"this state is of {header.get('kind')}, not of {name}; name the same tracker")
 
 
 def _pack(value: Any, arrays: list[NDArray[Any]]) -> Any:
@@ -137,21 +203,33 @@ def _pack(value: Any, arrays: list[NDArray[Any]]) -> Any:
 def _unpack(tree: Any, kind: Any, arrays: list[NDArray[Any]]) -> Any:
     """The value of type `kind` that a JSON tree stands for."""
     origin, arguments = get_origin(kind), get_args(kind)
+    if kind is types.NoneType:
+        return None
     if origin in (types.UnionType, typing.Union):
         if tree is None:
             return None
-        return _unpack(tree, next(one for one in arguments if one is not type(None)), arrays)
+        return _unpack(tree, next(one for one in arguments if one is not types.NoneType), arrays)
     if _is_array(kind):
         return dict(enumerate(arrays))[tree["array"]]
     if origin is tuple:
         if isinstance(arguments[-1], types.EllipsisType):
             return tuple(_unpack(item, arguments[0], arrays) for item in tree)
         return tuple(_unpack(item, one, arrays) for item, one in zip(tree, arguments, strict=True))
+    if dataclasses.is_dataclass(origin or kind):
+        return (origin or kind)(**{name: _unpack(tree[name], one, arrays) for name, one in _fields(kind).items()})
     if origin is not None and issubclass(origin, Mapping):
         return {_unpack(key, arguments[0], arrays): _unpack(item, arguments[1], arrays) for key, item in tree}
     if isinstance(kind, type):
         return _unpack_plain(tree, kind, arrays)
     raise StateError(f"a state cannot declare {kind}")
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    """The fields of a dataclass and their types; those of a generic one with the types that it was given."""
+    plain = get_origin(kind) or kind
+    given = dict(zip(getattr(plain, "__parameters__", ()), get_args(kind), strict=False))
+    hints = get_type_hints(plain)
+    return {one.name: given.get(hints[one.name], hints[one.name]) for one in dataclasses.fields(plain)}
 
 
 def _is_array(kind: Any) -> bool:
@@ -161,11 +239,6 @@ def _is_array(kind: Any) -> bool:
 
 
 def _unpack_plain(tree: Any, kind: type, arrays: list[NDArray[Any]]) -> Any:
-    if dataclasses.is_dataclass(kind):
-        hints = get_type_hints(kind)
-        return kind(
-            **{one.name: _unpack(tree[one.name], hints[one.name], arrays) for one in dataclasses.fields(kind)}
-        )
     if issubclass(kind, tuple):  # a named tuple
         return kind(
             *(_unpack(item, one, arrays) for item, one in zip(tree, get_type_hints(kind).values(), strict=True))
@@ -175,3 +248,21 @@ def _unpack_plain(tree: Any, kind: type, arrays: list[NDArray[Any]]) -> Any:
             raise StateError(f"this saved state is damaged: {tree!r} is not {kind.__name__}")
         return kind(tree)
     raise StateError(f"a state cannot declare {kind.__name__}")
+
+
+def _lay_out(kind: Any, known: dict[str, str]) -> None:
+    """Put down the fields of every dataclass and named tuple in a type."""
+    for one in get_args(kind):
+        _lay_out(one, known)
+    plain = get_origin(kind) or kind
+    name = f"{plain.__module__}.{plain.__qualname__}" if isinstance(plain, type) else ""
+    named = isinstance(plain, type) and issubclass(plain, tuple) and plain is not tuple
+    if (named or dataclasses.is_dataclass(plain)) and name not in known:
+        fields = get_type_hints(plain) if named else _fields(kind)
+        known[name] = ", ".join(f"{field}: {_word(one)}" for field, one in fields.items())
+        for one in fields.values():
+            _lay_out(one, known)
+
+
+def _word(kind: Any) -> str:
+    return kind.__qualname__ if isinstance(kind, type) and not get_args(kind) else str(kind)

@@ -9,7 +9,7 @@ from worlds import World, crossing, two_apart
 import perdure
 from perdure import states
 from perdure.detect import Background, BoxMasks, Recorded
-from perdure.detect.box_masks import BoxMasksState, nearest, whole_pixels
+from perdure.detect.box_masks import nearest, whole_pixels
 from perdure.errors import ParameterError
 from perdure.types import Frame, Mask, Regions, Report, Scene, Tracks
 
@@ -107,8 +107,7 @@ def test_it_resumes_heeds_the_tracker_and_says_nothing_of_frames_without_a_pictu
         state = detector.heed(state, Report(rows))
         found.append(regions)
         if frame.index == 7:
-            kind = BoxMasksState(state.other, states.load(states.save(state.background), type(state.background)))
-            state = kind
+            state = states.load(states.save(state), states.kind_of(detector))
     assert state.background.held.any()
     assert sum(mask.area > 100 for mask in found[20].masks) == 2
     cut = BoxMasks(boxes_of(world))

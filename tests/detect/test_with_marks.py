@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from worlds import two_apart
 
+from perdure import states
 from perdure.detect import Background, Mark, Recorded, WithMarks
 from perdure.fold import detect
 from perdure.types import Event, Frame, Mask, Regions, Report, Scene, Tracks
@@ -98,3 +99,19 @@ def test_the_detector_goes_on_as_without_marks_and_heeds_the_tracker():
 def test_it_needs_pictures_if_the_other_does():
     assert WithMarks(Background()).needs_pixels
     assert not WithMarks(Recorded()).needs_pixels
+
+
+def test_it_goes_on_from_a_saved_state_with_the_other_detectors():
+    world = two_apart()
+    detector = WithMarks(Background(), marks=(Mark(frame=9, id=7, area=block(20, 10, 10, 16)),))
+    state, found = detector.start(world.scene), {0: [], 12: []}
+    for resumed, regions in found.items():
+        for frame in world.frames():
+            if resumed and frame.index == 0:
+                state = detector.start(world.scene)
+            if resumed and frame.index == resumed:
+                state = states.load(states.save(state), states.kind_of(detector))
+            state, seen_here = detector.step(state, frame)
+            regions.append(seen_here)
+    assert all(one.equals(other) for one, other in zip(found[0], found[12], strict=True))
+    assert sum(len(one) for one in found[12]) > 20

@@ -6,24 +6,26 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure.detect.background import Background, BackgroundState
 from perdure.detect.silhouette import silhouette
+from perdure.states import kind_of
 from perdure.types import Bits, Boxes, Frame, Image, Mask, Regions, Report, Scene
 
+S = TypeVar("S")
 KINDS = ("none", "background", "cut")
 _LEAST = 0.05  # of a box: where fewer pixels are found there is no silhouette
 
 
 @dataclass(frozen=True, eq=False)
-class BoxMasksState:
+class BoxMasksState(Generic[S]):
     """The other detector's state, and that of the background model where there is one."""
 
-    other: Any
+    other: S
     background: BackgroundState | None
 
 
@@ -44,6 +46,11 @@ class BoxMasks:
         """Silhouettes are of pixels."""
         return True
 
+    @property
+    def state_kind(self) -> Any:
+        """What its state is, with the other detector's: for `perdure.states.load`."""
+        return BoxMasksState[kind_of(self.detector)]  # type: ignore[misc]
+
     def prepare(self, frames: Sequence[Frame]) -> BoxMasks:
         """Return this detector with the first looks taken: that of the background model, and the other detector's."""
         prepare = getattr(self.detector, "prepare", None)
@@ -53,12 +60,12 @@ class BoxMasks:
             background=None if self.background is None else self.background.prepare(frames),
         )
 
-    def start(self, scene: Scene) -> BoxMasksState:
+    def start(self, scene: Scene) -> BoxMasksState[Any]:
         """Return the state before the first frame."""
         model = self.background
         return BoxMasksState(self.detector.start(scene), None if model is None else model.start(scene))
 
-    def step(self, state: BoxMasksState, frame: Frame) -> tuple[BoxMasksState, Regions]:
+    def step(self, state: BoxMasksState[Any], frame: Frame) -> tuple[BoxMasksState[Any], Regions]:
         """Return the other detector's regions of one frame in their order, with silhouettes."""
         other, regions = self.detector.step(state.other, frame)
         background, moving = state.background, None
@@ -74,7 +81,7 @@ class BoxMasks:
             masks[k] = mask
         return state, dataclasses.replace(regions, masks=tuple(masks))
 
-    def heed(self, state: BoxMasksState, report: Report) -> BoxMasksState:
+    def heed(self, state: BoxMasksState[Any], report: Report) -> BoxMasksState[Any]:
         """Tell the background model, and the other detector where it heeds it, what the tracker said."""
         heed = getattr(self.detector, "heed", None)
         other = state.other if heed is None else heed(state.other, report)

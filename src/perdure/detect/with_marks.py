@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 from perdure.detect.marked import Mark, Marked, MarkedState
 from perdure.features.boxes import areas, intersections
 from perdure.features.masks import mask_shares
+from perdure.states import kind_of
 from perdure.types import Frame, Regions, Report, Scene
 
+S = TypeVar("S")
 _SAME = 0.5  # share of a region from which it is what is marked
 
 
 @dataclass(frozen=True, eq=False)
-class WithMarksState:
+class WithMarksState(Generic[S]):
     """The place, and the other detector's state."""
 
     marked: MarkedState
-    other: Any
+    other: S
 
 
 @dataclass(frozen=True)
@@ -49,17 +51,22 @@ class WithMarks:
         """Whether the other detector needs pictures."""
         return bool(self.detector.needs_pixels)
 
-    def start(self, scene: Scene) -> WithMarksState:
+    @property
+    def state_kind(self) -> Any:
+        """What its state is, with the other detector's: for `perdure.states.load`."""
+        return WithMarksState[kind_of(self.detector)]  # type: ignore[misc]
+
+    def start(self, scene: Scene) -> WithMarksState[Any]:
         """Return the state before the first frame."""
         return WithMarksState(Marked(self.marks).start(scene), self.detector.start(scene))
 
-    def step(self, state: WithMarksState, frame: Frame) -> tuple[WithMarksState, Regions]:
+    def step(self, state: WithMarksState[Any], frame: Frame) -> tuple[WithMarksState[Any], Regions]:
         """Return the marks of one frame in their order, then the other regions in theirs."""
         marked, given = Marked(self.marks).step(state.marked, frame)
         other, seen = self.detector.step(state.other, frame)
         return WithMarksState(marked, other), _together(given, seen) if len(given) else seen
 
-    def heed(self, state: WithMarksState, report: Report) -> WithMarksState:
+    def heed(self, state: WithMarksState[Any], report: Report) -> WithMarksState[Any]:
         """Tell the other detector, where it heeds it, what the tracker said."""
         heed = getattr(self.detector, "heed", None)
         return state if heed is None else WithMarksState(state.marked, heed(state.other, report))
