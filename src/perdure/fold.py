@@ -10,14 +10,17 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from perdure.interpret import Interpreter
+from perdure.interpret import Interpreter, Placing
 from perdure.types import Dropped, Event, Frame, Regions, Renamed, Report, Scene, Tracks
 
 S = TypeVar("S")
+D = TypeVar("D")
+T = TypeVar("T")
+V = TypeVar("V")
 
 
 class Detector(Protocol[S]):
@@ -75,6 +78,15 @@ class Step(NamedTuple):
     report: Report
 
 
+@dataclass(frozen=True, eq=False)
+class Standing(Generic[D, T, V]):
+    """Where a run stands between two frames: all that it goes on from."""
+
+    detector: D
+    tracker: T
+    views: V  # of interpretation, or of places on the ground; None where there is neither
+
+
 def detect(frames: Iterable[Frame], detector: Detector[Any], scene: Scene) -> Iterator[tuple[Frame, Regions]]:
     """Yield every frame with the regions that are seen in it."""
     state = detector.start(scene)
@@ -98,31 +110,45 @@ def run(
     tracker: Tracker[Any],
     scene: Scene,
     wanted: Callable[[Regions], Regions] | None = None,
-    interpreter: Interpreter | None = None,
+    interpreter: Interpreter | Placing | None = None,
+    begin: Standing[Any, Any, Any] | None = None,
+    between: Callable[[Standing[Any, Any, Any]], None] | None = None,
 ) -> Iterator[Step]:
     """Yield a step for every frame, and one more in which the tracker finishes; the detector heeds the tracker.
 
     `wanted` leaves the regions that the tracker shall see; an `interpreter` adds to what the tracker says and takes back
     from it, the tracker heeds its advice, and the detector heeds what is left.
+    A run `begin`s where an earlier one stood, with the frames that come then. `between` is told after every frame, when
+    its step has been taken up, where the run stands; what it is told is consumed by the next frame.
     """
-    state, beliefs = detector.start(scene), tracker.start(scene)
-    views = None if interpreter is None else interpreter.start()
+    now = begin or _beginning(detector, tracker, scene, interpreter)
+    state, beliefs, views = now.detector, now.tracker, now.views
     heed, advised = getattr(detector, "heed", None), getattr(tracker, "heed", None)
     for frame in frames:
         state, regions = detector.step(state, frame)
         if wanted is not None:
             regions = wanted(regions)
         beliefs, report = tracker.step(beliefs, frame, regions)
-        if interpreter is not None and views is not None:
+        if interpreter is not None:
             views, report, advice = interpreter.step(views, frame.index, frame.time, report)
             beliefs = beliefs if advised is None else advised(beliefs, advice)
         if heed is not None:
             state = heed(state, report)
         yield Step(frame, regions, _with_events(regions, report))
+        if between is not None:
+            between(Standing(state, beliefs, views))
     last = tracker.finish(beliefs)
-    if interpreter is not None and views is not None:
+    if interpreter is not None:
         last = interpreter.finish(views, last)
     yield Step(None, Regions.empty(), last)
+
+
+def _beginning(
+    detector: Detector[Any], tracker: Tracker[Any], scene: Scene, interpreter: Interpreter | Placing | None
+) -> Standing[Any, Any, Any]:
+    """Where a run stands before its first frame."""
+    views = None if interpreter is None else interpreter.start()
+    return Standing(detector.start(scene), tracker.start(scene), views)
 
 
 def _with_events(regions: Regions, report: Report) -> Report:

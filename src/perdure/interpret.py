@@ -237,6 +237,26 @@ class Interpreter:
         return Advice(np.array(list(times), np.int64), np.array(list(times.values()), np.float64))
 
 
+@dataclass(frozen=True)
+class Placing:
+    """Rows put on the ground plane, where nothing else is interpreted."""
+
+    ground: Ground
+
+    def start(self) -> Paths:
+        """Return the state before the first report."""
+        return Paths.none()
+
+    def step(self, state: Paths, frame: int, time: float, report: Report) -> tuple[Paths, Report, Advice]:
+        """Return the state after a frame's report, and the report with places and speeds."""
+        paths, rows = placed(self.ground, state, report.rows)
+        return paths, replace(report, rows=rows), Advice.none()
+
+    def finish(self, state: Paths, report: Report) -> Report:
+        """Return the tracker's last report with places and speeds."""
+        return replace(report, rows=placed(self.ground, state, report.rows)[1])
+
+
 class Told(NamedTuple):
     """What interpretation tells of a finished run."""
 

@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import math
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -30,12 +30,11 @@ from perdure.files.shapes import filled
 from perdure.files.video import Source, open_source
 from perdure.files.zones import read_zones
 from perdure.foreign import AnySettings, made_foreign
-from perdure.interpret import Feedback, Interpreter
-from perdure.scene.ground import Ground
+from perdure.interpret import Feedback, Interpreter, Placing
 from perdure.scene.perspective import BODY, Estimate, estimate
-from perdure.scene.placing import Paths, placed
 from perdure.scene.scenarios import Rules
 from perdure.scene.zones import Zones
+from perdure.states import kind_of
 from perdure.trackers import TRACKERS
 from perdure.types import Frame, Regions, Report, Scene, Tracks
 
@@ -45,6 +44,7 @@ LOOKED = 120.0  # s of a film in which people tell of the ground
 AUTO = "auto"
 FIRST_LOOKS = 25  # frames spread over a file that a detector may see first
 
+AnyStanding = fold.Standing[Any, Any, Any]
 AnySource = str | Path | int | Iterable[NDArray[np.uint8]] | LiveSource
 
 
@@ -176,14 +176,34 @@ class Plan:
         for frame, regions in fold.detect(self.source if frames is None else frames, self._whole(), self.scene):
             yield frame, self._wanted(regions)
 
-    def steps(self, frames: Iterable[Frame] | None = None) -> Iterator[fold.Step]:
-        """Yield every step of the run, the finishing one last."""
+    def steps(
+        self,
+        frames: Iterable[Frame] | None = None,
+        begin: AnyStanding | None = None,
+        between: Callable[[AnyStanding], None] | None = None,
+    ) -> Iterator[fold.Step]:
+        """Yield every step of the run, the finishing one last; `begin` and `between` as for `perdure.fold.run`."""
         given = self.source if frames is None else frames
-        if self.rules is not None:  # which puts rows on the ground itself
-            interpreter = Interpreter.of(self.scene, self.rules, self.feedback)
-            return fold.run(given, self._whole(), self.tracker, self.scene, self._wanted, interpreter)
-        steps = fold.run(given, self._whole(), self.tracker, self.scene, self._wanted)
-        return steps if self.scene.ground is None else _placed(steps, self.scene.ground)
+        interpreter = self._interpreter()
+        return fold.run(given, self._whole(), self.tracker, self.scene, self._wanted, interpreter, begin, between)
+
+    def standing_kind(self) -> Any:
+        """Return the type of where its run stands between two frames, for `perdure.states.load`.
+
+        Raises
+        ------
+        StateError
+            If the detector or the tracker does not say what its state is.
+        """
+        interpreter = self._interpreter()
+        views = None if interpreter is None else kind_of(interpreter)
+        return fold.Standing[kind_of(self._whole()), kind_of(self.tracker), views]  # type: ignore[misc]
+
+    def _interpreter(self) -> Interpreter | Placing | None:
+        """What interprets the tracker's reports; it puts rows on the ground, too."""
+        if self.rules is not None:
+            return Interpreter.of(self.scene, self.rules, self.feedback)
+        return None if self.scene.ground is None else Placing(self.scene.ground)
 
     def _whole(self) -> Any:
         """The detector, with the marks beside it."""
@@ -354,14 +374,6 @@ def check_body(height: float | None) -> float:
     if not (isinstance(height, (int, float)) and 0.05 <= height <= 20.0):
         raise ParameterError(f"object_height = {height!r} is out of range: it must be 0.05 to 20 m")
     return float(height)
-
-
-def _placed(steps: Iterable[fold.Step], ground: Ground) -> Iterator[fold.Step]:
-    """The steps, their rows with places and speeds on the ground."""
-    paths = Paths.none()
-    for step in steps:
-        paths, rows = placed(ground, paths, step.report.rows)
-        yield step._replace(report=dataclasses.replace(step.report, rows=rows))
 
 
 def track(source: AnySource, **options: Any) -> Tracks:

@@ -64,7 +64,11 @@ class Numbered:
         return self.span.numbers(self.total, self.fps)
 
     def __iter__(self) -> Iterator[Frame]:
-        frames = ahead(self._frames()) if self.has_images else self._frames()
+        return self.after(-1)
+
+    def after(self, index: int) -> Iterator[Frame]:
+        """Yield the wanted frames behind frame `index`."""
+        frames = ahead(self._frames(index)) if self.has_images else self._frames(index)
         self.running.add(frames)
         return frames
 
@@ -93,9 +97,10 @@ class Numbered:
         for frames in list(self.running):
             frames.close()
 
-    def _frames(self) -> Generator[Frame, None, None]:
+    def _frames(self, after: int) -> Generator[Frame, None, None]:
         for index in self.wanted:
-            yield self._frame(index)
+            if index > after:
+                yield self._frame(index)
 
     def _frame(self, index: int) -> Frame:
         try:

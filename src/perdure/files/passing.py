@@ -63,6 +63,10 @@ class Passing:
         self.running.add(frames)
         return frames
 
+    def after(self, index: int) -> Iterator[Frame]:
+        """Yield what still comes behind frame `index`; what has passed does not come again."""
+        return (frame for frame in self if frame.index > index)
+
     def sample(self, count: int) -> list[Frame]:
         """Return nothing: what has passed does not come again."""
         return []

@@ -56,7 +56,14 @@ class Recording:
         return wanted if known.stamps else None
 
     def __iter__(self) -> Iterator[Frame]:
-        frames = ahead(self._frames())
+        return self.after(-1)
+
+    def after(self, index: int) -> Iterator[Frame]:
+        """Yield the wanted frames behind frame `index`.
+
+        Those before it are decoded, too: from another entry a decoder may give other pictures.
+        """
+        frames = ahead(self._frames(index))
         self.running.add(frames)
         return frames
 
@@ -116,8 +123,8 @@ class Recording:
         known = self.listing or list_frames(self.path)
         return known, wanted_frames(self.span, known, self.fixed, self.first)
 
-    def _frames(self) -> Generator[Frame, None, None]:
-        """The wanted frames; DamagedVideo at the first damage, after every frame before it."""
+    def _frames(self, after: int) -> Generator[Frame, None, None]:
+        """The wanted frames behind one; DamagedVideo at the first damage, after every frame before it."""
         clock = self._clock()
         begin: int | None = None
         upcoming = 0
@@ -130,7 +137,7 @@ class Recording:
                 if not self.span.reached(picture.index, time):
                     continue
                 begin = picture.index if begin is None else begin
-                if (picture.index - begin) % self.span.stride == 0:
+                if picture.index > after and (picture.index - begin) % self.span.stride == 0:
                     yield Frame(picture.index, time, self._image(picture, time))
         except Broken:
             raise self._damaged(upcoming, clock.next_time) from None

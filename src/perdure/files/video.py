@@ -87,6 +87,10 @@ class Source(Protocol):
         """Yield the frames; raises DamagedVideo where the source breaks off."""
         ...
 
+    def after(self, index: int) -> Iterator[Frame]:
+        """Yield the frames behind frame `index`, the very ones that iterating gives; only if it is rereadable."""
+        ...
+
     def sample(self, count: int) -> list[Frame]:
         """Return about `count` frames spread over the whole, for a first look; [] if not rereadable."""
         ...
