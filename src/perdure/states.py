@@ -28,6 +28,7 @@ import typing
 import zipfile
 import zlib
 from collections.abc import Mapping
+from textwrap import shorten
 from typing import IO, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -54,8 +55,10 @@ def save(state: object) -> bytes:
     return out.getvalue()
 
 
-def write(state: object, file: IO[bytes]) -> None:
+def write(state: object, file: IO[bytes], release: str = "") -> None:
     """Write the bytes of `save` into a file that is open and can be sought in, without a copy of them in memory.
+
+    `release` says what made it; `load` wants the same.
 
     Raises
     ------
@@ -65,6 +68,7 @@ def write(state: object, file: IO[bytes]) -> None:
     arrays: list[NDArray[Any]] = []
     tree = _pack(state, arrays)
     header = {"format": FORMAT, "version": VERSION, "kind": type(state).__qualname__, "tree": tree}
+    header |= {"release": release} if release else {}
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(zipfile.ZipInfo(_TREE, _EPOCH), json.dumps(header, separators=(",", ":")))
         for number, array in enumerate(arrays):
@@ -72,8 +76,8 @@ def write(state: object, file: IO[bytes]) -> None:
                 _write_array(entry, array)
 
 
-def load(data: bytes, kind: type[S]) -> S:
-    """Return the state that `save` wrote, independent of every other; its arrays are writable.
+def load(data: bytes, kind: type[S], release: str = "") -> S:
+    """Return the state that `save` or `write` wrote, independent of every other; its arrays are writable.
 
     A generic dataclass is given with the types of its parts: `Pair[Walk, Swim]`.
 
@@ -86,7 +90,7 @@ def load(data: bytes, kind: type[S]) -> S:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             _check_size(archive, len(data))
             header = json.loads(archive.read(_TREE))
-            _check_header(header, kind)
+            _check_header(header, kind, release)
             count = len(archive.namelist()) - 1
             arrays = [_read_array(archive.read(f"{number}.npy")) for number in range(count)]
         return cast(S, _unpack(header["tree"], kind, arrays))
@@ -166,12 +170,17 @@ _DAMAGE = (
 )
 
 
-def _check_header(header: Any, kind: type) -> None:
+def _check_header(header: Any, kind: type, release: str) -> None:
     if not isinstance(header, Mapping) or header.get("format") != FORMAT:
         raise StateError("this is not a saved state of Perdure")
     if header.get("version") != VERSION:
         raise StateError(
             f"this state has version {header.get('version')}, this Perdure reads version {VERSION}; start the run anew"
+        )
+    if header.get("release", "") != release:
+        raise StateError(
+            f"this state was saved by another version ({shorten(str(header.get('release', '')), 60) or 'none'}); this is "
+            f"{release or 'none'}; start the run anew"
         )
     name = (get_origin(kind) or kind).__qualname__
     if header.get("kind") != name:
