@@ -394,13 +394,13 @@ def test_a_full_standard_output_is_said_in_one_line(place: Path):
 
 def test_a_failed_run_leaves_no_wreck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     from perdure import pipeline
-    from perdure.cli.track import run
+    from perdure.cli.running import run
     from perdure.files.runs import Reporting, RunFolder
 
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("perdure.cli.track.RunLog.append", broken)
+    monkeypatch.setattr("perdure.cli.running.RunLog.append", broken)
     plan = pipeline.plan([frame.image for frame in two_apart().frames()], fps=10)
     with pytest.raises(OSError, match="No space"):
         run(plan, RunFolder.create(tmp_path / "run", overwrite=False), Reporting(), film=False)

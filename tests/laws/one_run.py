@@ -9,7 +9,7 @@ import cv2
 from worlds import crossing
 
 from perdure import pipeline
-from perdure.cli.track import run
+from perdure.cli.running import run
 from perdure.files.runs import Reporting, RunFolder
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import typer
 
 from perdure.cli import options
 from perdure.cli.progress import watched
-from perdure.cli.track import run
+from perdure.cli.running import run
 from perdure.demo import demo_world
 from perdure.errors import OutputError
 from perdure.files.film import Film

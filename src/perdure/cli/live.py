@@ -12,8 +12,8 @@ import typer
 
 from perdure import params
 from perdure.cli import options
+from perdure.cli.running import asked
 from perdure.cli.stopping import Ending
-from perdure.cli.track import about_run
 from perdure.detect import DETECTORS
 from perdure.detection import detector_name, file_of
 from perdure.errors import FormatError, ParameterError
@@ -140,7 +140,7 @@ def live(
         )
         place = output or Path("perdure-runs") / opened.name
         check_place(place)
-        rolling = Rolling(place, about_run(made, reporting, {"roi": roi}), reporting, every, keep)
+        rolling = Rolling(place, asked(made, reporting, {"roi": roi}), reporting, every, keep)
         vital = Vital(opened)
         with _served(health, vital) as url, Ending() as ending:
             print(f"perdure: following {opened.origin} into {place}{url}; Ctrl-C ends it", file=sys.stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import threading
 from collections.abc import Iterable, Iterator
@@ -35,16 +36,23 @@ class Ending:
             return "interrupted"
         return "done" if self.damage is None else "damaged"
 
-    def first_look(self, plan: Plan) -> Plan:
-        """Return the plan with its first look taken, or as it was if the user interrupts."""
+    @contextlib.contextmanager
+    def at_once_within(self) -> Iterator[None]:
+        """Within the context the first signal interrupts."""
         self._waiting = True
         try:
-            return plan.prepared()
+            yield
+        finally:
+            self._waiting = False
+
+    def first_look(self, plan: Plan) -> Plan:
+        """Return the plan with its first look taken, or as it was if the user interrupts."""
+        try:
+            with self.at_once_within():
+                return plan.prepared()
         except KeyboardInterrupt:
             self.interrupted = True
             return plan
-        finally:
-            self._waiting = False
 
     def frames(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """Yield the frames; damage and interruption end them quietly."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import IO, Any
 
+from perdure.files.checkpoints import Lasting
 from perdure.fold import Step
 from perdure.types import Event
 
@@ -20,8 +21,17 @@ class LiveEvents:
 
     def __init__(self, out: Callable[[dict[str, Any]], None]) -> None:
         self._out = out
-        self._lasting: set[tuple[str, tuple[int, ...], str]] = set()
+        self._lasting: set[Lasting] = set()
         self._time = 0.0
+
+    @property
+    def lasting(self) -> tuple[Lasting, ...]:
+        """What was told as begun and not yet as over, sorted."""
+        return tuple(sorted(self._lasting))
+
+    def go_on(self, lasting: Iterable[Lasting], time: float) -> None:
+        """Go on where an earlier run had told that this lasts, at this time in seconds."""
+        self._lasting, self._time = set(lasting), time
 
     def tell(self, step: Step) -> None:
         """Write what a step tells."""

@@ -72,6 +72,12 @@ def words_of(given: AnyMark | Sequence[AnyMark]) -> tuple[str, ...]:
     return tuple(text for _, _, text in _each(given))
 
 
+def files_of(given: AnyMark | Sequence[AnyMark]) -> tuple[Path, ...]:
+    """Return the files among what was given, each once."""
+    places = [Path(what) for what, _, _ in _each(given) if isinstance(what, (str, Path)) and is_file(what)]
+    return tuple(dict.fromkeys(places))
+
+
 def _each(given: Any) -> Iterator[tuple[Any, int, str]]:
     """What is marked, its frame, and how the user said it."""
     several = isinstance(given, (list, tuple)) and not _is_pair(given)

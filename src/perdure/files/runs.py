@@ -1,4 +1,7 @@
-"""The run folder: `run.json`, `tracks.jsonl`, `tracks.txt`, `events.csv`, `tracked.mp4`; `corrections.jsonl` by hand."""
+"""The run folder: `run.json`, `tracks.jsonl`, `tracks.txt`, `events.csv`, `tracked.mp4`; `corrections.jsonl` by hand.
+
+Until the run is done there is its checkpoint, too.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,7 @@ from perdure.params import parameter
 from perdure.types import Event, Report, Tracks
 
 FORMAT, VERSION = "perdure-run", 1
+FINISHED = ("done", "damaged")  # how a run ends that has nothing to go on with
 EVENT_COLUMNS = (
     "kind",
     "begin_frame",
@@ -34,7 +38,7 @@ EVENT_COLUMNS = (
     "confidence",
     "why",
 )
-PARTS = ("run.json", "tracks.jsonl", "tracks.txt", "events.csv", "tracked.mp4", CORRECTIONS)
+PARTS = ("run.json", "tracks.jsonl", "checkpoint.zip", "tracks.txt", "events.csv", "tracked.mp4", CORRECTIONS)
 _LEFTOVERS = {".DS_Store", *(f".{name}.part" for name in PARTS)}  # of a run that was killed
 
 
@@ -89,10 +93,12 @@ class RunFolder:
             raise OutputError(f"{self.path} holds other files ({min(there)}); name a new folder with -o")
         if "run.json" in there and not overwrite:
             try:
-                of = self.read_about().get("source", "another source")
+                about = self.read_about()
+                of, over = about.get("source", "another source"), about.get("status") in FINISHED
             except FormatError:
-                of = "something"
-            raise OutputError(f"{self.path} holds a run of {of}; add --overwrite, or name another folder with -o")
+                of, over = "something", True
+            add = "--overwrite" if over else "--resume to go on with it, or --overwrite"
+            raise OutputError(f"{self.path} holds a run of {of}; add {add}, or name another folder with -o")
         for part in PARTS:
             place = self.path / part
             if place.is_dir():
