@@ -56,7 +56,7 @@ def save(state: object) -> bytes:
 
 
 def write(state: object, file: IO[bytes], release: str = "") -> None:
-    """Write the bytes of `save` into a file that is open and can be sought in, without a copy of them in memory.
+    """Write the bytes of `save` into a file that is open and can be sought in, without a copy of all of them in memory.
 
     `release` says what made it; `load` wants the same.
 
@@ -72,8 +72,7 @@ def write(state: object, file: IO[bytes], release: str = "") -> None:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(zipfile.ZipInfo(_TREE, _EPOCH), json.dumps(header, separators=(",", ":")))
         for number, array in enumerate(arrays):
-            with archive.open(zipfile.ZipInfo(f"{number}.npy", _EPOCH), "w", force_zip64=True) as entry:
-                _write_array(entry, array)
+            archive.writestr(zipfile.ZipInfo(f"{number}.npy", _EPOCH), _packed(array))
 
 
 def load(data: bytes, kind: type[S], release: str = "") -> S:
@@ -133,14 +132,14 @@ def _check_size(archive: zipfile.ZipFile, size: int) -> None:
         raise StateError("this saved state is damaged (it is larger inside than outside); start the run anew")
 
 
-def _write_array(entry: IO[bytes], array: NDArray[Any]) -> None:
-    """An array as in a `.npy` file."""
+def _packed(array: NDArray[Any]) -> memoryview:
+    """The bytes of an array as in a `.npy` file."""
     array = np.asarray(array, order="C")
-    if array.dtype.hasobject:
-        raise StateError("a state cannot hold an array of objects: only of numbers and words")
-    np.lib.format.write_array_header_1_0(entry, np.lib.format.header_data_from_array_1_0(array))
+    content = io.BytesIO()
+    np.lib.format.write_array_header_1_0(content, np.lib.format.header_data_from_array_1_0(array))
     if array.size:
-        entry.write(array.reshape(-1).view(np.uint8).data)
+        content.write(array.reshape(-1).view(np.uint8).data)
+    return content.getbuffer()
 
 
 def _read_array(content: bytes) -> NDArray[Any]:
@@ -198,6 +197,8 @@ def _pack(value: Any, arrays: list[NDArray[Any]]) -> Any:
     if isinstance(value, (int, float)):
         return value
     if isinstance(value, np.ndarray):
+        if value.dtype.hasobject:
+            raise StateError("a state cannot hold an array of objects: only of numbers and words")
         arrays.append(value)
         return {"array": len(arrays) - 1}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
