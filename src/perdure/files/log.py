@@ -90,7 +90,10 @@ class RunLog:
         try:
             self._write(report_to_json(frame, time, report))
         except OSError as error:
-            raise cannot_write(self._path, error) from error
+            raise OutputError(
+                f"cannot write {self._path}: {error.strerror or error}; what is in it is kept: make room, and go on with "
+                "--resume"
+            ) from error
 
     def sync(self) -> None:
         """Have everything so far on the disk."""
