@@ -1,6 +1,7 @@
-"""Runs that are killed: `killed.py VIDEO FOLDER KILLS` prints, as JSON, after which frame each was gone on with.
+"""Runs that are killed: `killed.py VIDEO FOLDER KILLS` prints, as JSON, with which frames each was gone on with.
 
-Each run is a process that this one forks when everything is loaded, so that a run lasts no longer than its tracking.
+Each run is a process that this one forks when everything is loaded, so that a run lasts no longer than its tracking;
+OpenCV's threads do not outlive a fork, so that it has none.
 """
 
 from __future__ import annotations
@@ -14,16 +15,22 @@ import sys
 import time
 from pathlib import Path
 
-from perdure.cli import main
-from perdure.cli.commands import run as _loaded  # noqa: F401 - whatever a run needs
+import cv2
+
+from perdure.cli import main, resuming
 
 OPTIONS = ["--no-video", "--checkpoint-every", "0", "--tracker", "overlap", "--resume"]
 
 
 def started(video: str, folder: Path) -> int:
     child = os.fork()
-    if child:
-        return child
+    if not child:
+        os._exit(tracked(video, folder))
+    return child
+
+
+def tracked(video: str, folder: Path) -> int:
+    """Track in this process; its exit code."""
     sys.argv = ["perdure", "track", video, "-o", str(folder), *OPTIONS]
     with (
         open(os.devnull, "w") as nothing,
@@ -33,8 +40,8 @@ def started(video: str, folder: Path) -> int:
         try:
             main()
         except SystemExit as ended:
-            os._exit(int(ended.code or 0))
-    os._exit(1)
+            return int(ended.code or 0)
+    return 1
 
 
 def code(child: int) -> int:
@@ -59,7 +66,9 @@ def killed(video: str, folder: Path, after: float) -> int:
 
 if __name__ == "__main__":
     video, place, kills = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
-    lasting(video, place / "first")  # which finds everything in the disk's cache
+    cv2.setNumThreads(1)
+    resuming.SHARE = float("inf")  # a checkpoint behind every frame
+    assert tracked(video, place / "first") == 0  # which loads everything
     length, rng, told = lasting(video, place / "peace"), random.Random(7), []
     for number in range(kills):
         folder = place / str(number)

@@ -15,8 +15,9 @@ import pytest
 from test_cli import PERDURE, perdure, write_film
 from worlds import crossing, two_apart
 
+from perdure import pipeline
 from perdure.cli import resuming
-from perdure.errors import OutputError
+from perdure.errors import OutputError, ParameterError
 from perdure.files import checkpoints
 from perdure.files.log import RunLog, read_log
 from perdure.files.mot import write_rows
@@ -66,7 +67,7 @@ def killed_at(frames: set[int], words: tuple[object, ...], at: Path, kept: str =
 
 @pytest.mark.usefixtures("at_every_frame")
 def test_a_run_killed_behind_any_frame_ends_with_the_bytes_of_an_unbroken_one(place: Path):
-    for run in killed_at({0, 1, 17, 30, 54}, ("walk.avi", *PLAIN), place):
+    for run in killed_at({0, 17, 54}, ("walk.avi", *PLAIN), place):
         with (run / "tracks.jsonl").open("ab") as log:
             log.write(b'{"frame":99,"time":9.9,"rows":[{"id":7,"bo')  # cut off while it was written
         done = perdure("track", "walk.avi", *PLAIN, "-o", run, "--resume", at=place)
@@ -83,7 +84,7 @@ def test_a_run_killed_behind_any_frame_ends_with_the_bytes_of_an_unbroken_one(pl
     "words",
     [
         ("--tracker", "compound", "--scenarios", "usual", "--start", "4f", "--stride", "2"),
-        ("--tracker", "contour", "--init", "20,28,16,20@10", "--detector", "background"),
+        ("--tracker", "contour", "--init", "20,28,16,20@10", "--detector", "background", "--end", "30f"),
         ("--tracker", "multifeature", "--calibration", "plane.json"),
         ("--tracker", "overlap", "--detector", "boxes.txt", "--box-masks", "background"),
     ],
@@ -102,23 +103,30 @@ def test_every_tracker_is_gone_on_with_whatever_is_around_it(place: Path, words:
 
 def test_runs_that_are_killed_at_any_moment_are_gone_on_with(place: Path):
     program = Path(__file__).parent / "killed.py"
-    long = [frame.image for _ in range(4) for frame in crossing().frames()]
-    film = write_film(place / "long.avi", long)
-    words = [sys.executable, str(program), str(film), str(place / "kills"), "5"]
+    words = [sys.executable, str(program), str(place / "walk.avi"), str(place / "kills"), "5"]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert sum(one["killed"] for one in told) >= 3
+    assert any(frame > 5 for one in told for frame in one["resumed"])
     for number in range(5):
         assert results(place / "kills" / str(number)) == results(place / "kills/peace"), told[number]
 
 
-def unfinished(place: Path, name: str, *words: object) -> Path:
+@pytest.fixture(scope="module")
+def once_killed(place: Path) -> Path:
     """A run of `walk.avi` that was killed behind frame 30, with its checkpoint behind frame 29."""
-    return next(killed_at({30}, ("walk.avi", *PLAIN, *words), place, kept=name))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(resuming, "SHARE", float("inf"))
+        return next(killed_at({30}, ("walk.avi", *PLAIN), place, kept="once"))
 
 
-@pytest.mark.usefixtures("at_every_frame")
+@pytest.fixture
+def unfinished(once_killed: Path, tmp_path: Path) -> Path:
+    """One like it, to be spoilt."""
+    return Path(shutil.copytree(once_killed, tmp_path / "unfinished"))
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -132,15 +140,14 @@ def unfinished(place: Path, name: str, *words: object) -> Path:
     ],
     ids=lambda words: words[0] if isinstance(words, tuple) else "",
 )
-def test_another_run_than_the_one_asked_for_is_refused_by_what_differs(place: Path, words, said: str):
+def test_another_run_than_the_one_asked_for_is_refused_by_what_differs(
+    place: Path, once_killed: Path, words, said: str
+):
     (place / "boxes.txt").write_text("")
-    run = place / "settled-30"
-    if not run.exists():
-        unfinished(place, "settled")
-    before = {one.name: one.read_bytes() for one in run.iterdir()}
-    done = perdure("track", "walk.avi", *PLAIN, *words, "-o", run, "--resume", at=place)
+    before = {one.name: one.read_bytes() for one in once_killed.iterdir()}
+    done = perdure("track", "walk.avi", *PLAIN, *words, "-o", once_killed, "--resume", at=place)
     assert (done.returncode, said in done.stderr) == (2, True), done.stderr
-    assert {one.name: one.read_bytes() for one in run.iterdir()} == before
+    assert {one.name: one.read_bytes() for one in once_killed.iterdir()} == before
 
 
 @pytest.mark.usefixtures("at_every_frame")
@@ -165,32 +172,29 @@ def test_another_source_or_file_of_detections_under_the_same_name_is_refused(tmp
     assert results(run) == results(tmp_path / "whole")
 
 
-@pytest.mark.usefixtures("at_every_frame")
 @pytest.mark.parametrize(
     ("harm", "said"),
     [
-        ("version", "saved by another version (Perdure 9.9.9"),
+        ("version", "saved by another version (Perdure 0."),
         ("checkpoint", "checkpoint.zip: this saved state is damaged"),
         ("log", "is not the log that this run wrote"),
         ("shorter", "is not the log that this run wrote"),
     ],
 )
 def test_a_checkpoint_that_cannot_be_gone_on_from_is_refused_with_a_remedy(
-    place: Path, monkeypatch: pytest.MonkeyPatch, harm: str, said: str
+    place: Path, unfinished: Path, monkeypatch: pytest.MonkeyPatch, harm: str, said: str
 ):
-    with pytest.MonkeyPatch.context() as patched:
-        if harm == "version":
-            patched.setattr(checkpoints, "__version__", "9.9.9")
-        run = unfinished(place, harm)
-    checkpoint, log = run / "checkpoint.zip", run / "tracks.jsonl"
-    if harm == "checkpoint":
+    checkpoint, log = unfinished / "checkpoint.zip", unfinished / "tracks.jsonl"
+    if harm == "version":
+        monkeypatch.setattr(checkpoints, "__version__", "9.9.9")
+    elif harm == "checkpoint":
         checkpoint.write_bytes(checkpoint.read_bytes()[:-100])
     elif harm == "log":
         log.write_bytes(log.read_bytes().replace(b'"id":1', b'"id":8'))
-    elif harm == "shorter":
+    else:
         log.write_bytes(log.read_bytes()[:500])
     before = log.read_bytes()
-    done = perdure("track", "walk.avi", *PLAIN, "-o", run, "--resume", at=place)
+    done = perdure("track", "walk.avi", *PLAIN, "-o", unfinished, "--resume", at=place)
     assert (done.returncode, said in done.stderr, "--overwrite" in done.stderr) == (2, True, True), done.stderr
     assert log.read_bytes() == before
 
@@ -212,21 +216,23 @@ def test_to_go_on_with_nothing_is_to_begin_and_with_a_finished_run_to_do_nothing
     assert "add --overwrite, or" in refused.stderr
 
 
-def test_what_passes_only_once_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("perdure.files.recording.Recording.rereadable", False, raising=False)
-    opened = resuming.Plan.__dataclass_fields__["source"]
-    assert opened.type == "Source"
-    from perdure import pipeline
-
+def test_what_passes_only_once_is_refused(place: Path):
     made = pipeline.plan(iter([frame.image for frame in crossing().frames()]), fps=10)
-    with pytest.raises(Exception, match="passes only once, so that a run of it cannot be gone on with"):
+    with pytest.raises(ParameterError, match="passes only once, so that a run of it cannot be gone on with"):
         resuming.found(made, place / "nowhere", {})
 
 
-@pytest.mark.usefixtures("at_every_frame")
-def test_an_interrupted_run_is_gone_on_with(place: Path, monkeypatch: pytest.MonkeyPatch):
-    from perdure.cli.stopping import Ending
+def test_a_tracker_that_cannot_be_saved_begins_anew(
+    place: Path, unfinished: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("perdure.cli.running.cannot_resume", lambda _: "it cannot be saved")
+    done = perdure("track", "walk.avi", *PLAIN, "-o", unfinished, "--resume", at=place)
+    assert "begins anew: it cannot be saved" in done.stderr
+    assert results(unfinished) == results(place / "whole")
 
+
+@pytest.mark.usefixtures("at_every_frame")
+def test_an_interrupted_run_is_gone_on_with(place: Path):
     append = RunLog.append
 
     def and_interrupt(log: RunLog, frame: int, *rest: object) -> None:
@@ -245,7 +251,6 @@ def test_an_interrupted_run_is_gone_on_with(place: Path, monkeypatch: pytest.Mon
     perdure("track", "walk.avi", *PLAIN, "-o", "unstopped", at=place)
     assert results(place / "stopped") == results(place / "unstopped")
     assert about(place / "stopped")["frames"] == 55
-    assert Ending().status == "done"
 
 
 @pytest.mark.usefixtures("at_every_frame")
@@ -258,15 +263,13 @@ def test_a_run_without_room_for_checkpoints_goes_on_and_says_so(place: Path, mon
     assert (done.returncode, "a checkpoint could not be written: no room" in done.stderr) == (0, True)
 
 
-def test_a_run_that_another_process_writes_is_left_alone(place: Path):
-    run = unfinished(place, "busy")
-    with RunLog(run / "tracks.jsonl") as log:
-        log.append(0, 0.0, next(iter(read_log(place / "whole/tracks.jsonl"))).report)
-        kept = (run / "tracks.jsonl").read_bytes()
-        (run / "checkpoint.zip").unlink(missing_ok=True)
-        done = perdure("track", "walk.avi", *PLAIN, "-o", run, "--resume", at=place)
+def test_a_run_that_another_process_writes_is_left_alone(place: Path, unfinished: Path):
+    (unfinished / "checkpoint.zip").unlink()
+    with RunLog(unfinished / "tracks.jsonl"):
+        kept = (unfinished / "tracks.jsonl").read_bytes()
+        done = perdure("track", "walk.avi", *PLAIN, "-o", unfinished, "--resume", at=place)
         assert (done.returncode, "is being written by another process" in done.stderr) == (2, True)
-        assert (run / "tracks.jsonl").read_bytes() == kept
+        assert (unfinished / "tracks.jsonl").read_bytes() == kept
 
 
 def test_a_disk_that_becomes_full_is_said_in_a_line_and_everything_before_is_kept(place: Path):

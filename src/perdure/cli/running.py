@@ -197,7 +197,8 @@ def _logged(
     """Track all frames, or those that are left, into the log."""
     made, earlier = running.made, None
     frames: Iterable[Frame] = made.source
-    if resume and not cannot_resume(made):
+    reason = cannot_resume(made)
+    if resume and not reason:
         earlier = read_checkpoint(folder.path, made.standing_kind())
     if earlier is not None:
         with ending.at_once_within():
@@ -207,7 +208,7 @@ def _logged(
     left = None if count is None else max(0, count - running.before)
     with RunLog(folder.log, None if earlier is None else earlier.log) as log:
         if resume:
-            _say_resumed(running, folder)
+            _say_resumed(running, folder, reason)
         frames = ending.frames(watched(frames, f"tracking {made.source.name}", left))
         between = checkpoints.taken_by(made, log, running.now)
         steps: Iterable[Step] = made.steps(frames, None if earlier is None else earlier.standing, between)
@@ -219,7 +220,7 @@ def _logged(
         log.sync()
 
 
-def _say_resumed(running: _Running, folder: RunFolder) -> None:
+def _say_resumed(running: _Running, folder: RunFolder, reason: str) -> None:
     """Say from where the run goes on, in its description, too."""
     progress = running.progress
     resumed = [*folder.read_about().get("resumed", ()), progress.frame + 1]
@@ -227,6 +228,7 @@ def _say_resumed(running: _Running, folder: RunFolder) -> None:
     running.about["resumed"] = resumed
     folder.write_about({**running.about, "status": "running"})
     where = f"goes on behind frame {progress.frame} ({progress.time:.2f} s)" if progress.frames else "begins anew"
+    where += f": {reason}" if reason else ""
     print(f"perdure: the run in {folder.path} {where}", file=sys.stderr)
 
 
