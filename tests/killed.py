@@ -48,16 +48,15 @@ def code(child: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def lasting(video: str, folder: Path) -> float:
-    begun = time.monotonic()
-    assert code(started(video, folder)) == 0
-    return time.monotonic() - begun
+def size(log: Path) -> int:
+    return log.stat().st_size if log.exists() else -1
 
 
-def killed(video: str, folder: Path, after: float) -> int:
-    """Kill a run after some seconds and go on with it; return how it was ended."""
+def killed(video: str, folder: Path, at: int) -> int:
+    """Kill a run when its log has so many bytes, and go on with it; return how it was ended."""
     child = started(video, folder)
-    time.sleep(after)
+    while size(folder / "tracks.jsonl") < at:
+        time.sleep(0.001)
     os.kill(child, signal.SIGKILL)
     ended = code(child)
     assert code(started(video, folder)) == 0
@@ -67,12 +66,13 @@ def killed(video: str, folder: Path, after: float) -> int:
 if __name__ == "__main__":
     video, place, kills = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
     cv2.setNumThreads(1)
-    resuming.SHARE = float("inf")  # a checkpoint behind every frame
+    resuming.SHARE = 0.3  # a checkpoint behind every few frames
     assert tracked(video, place / "first") == 0  # which loads everything
-    length, rng, told = lasting(video, place / "peace"), random.Random(7), []
+    assert code(started(video, place / "peace")) == 0
+    whole, rng, told = size(place / "peace/tracks.jsonl"), random.Random(7), []
     for number in range(kills):
         folder = place / str(number)
-        ended = killed(video, folder, length * (number + rng.random()) / kills)
+        ended = killed(video, folder, int(whole * (number + rng.random()) / kills))
         about = json.loads((folder / "run.json").read_text())
         told.append({"killed": ended == -signal.SIGKILL, "resumed": about.get("resumed", [])})
     print(json.dumps(told))

@@ -107,8 +107,8 @@ def test_runs_that_are_killed_at_any_moment_are_gone_on_with(place: Path):
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert sum(one["killed"] for one in told) >= 3
-    assert any(frame > 5 for one in told for frame in one["resumed"])
+    assert sum(one["killed"] for one in told) >= 3, told
+    assert any(frame > 0 for one in told for frame in one["resumed"]), told
     for number in range(5):
         assert results(place / "kills" / str(number)) == results(place / "kills/peace"), told[number]
 
