@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import hashlib
 import importlib.metadata
 import itertools
@@ -69,6 +70,67 @@ def test_only_the_rooms_for_files_open_files():
             called = node.func if isinstance(node, ast.Call) else None
             name = getattr(called, "id", getattr(called, "attr", ""))
             assert name not in ("open", "imread", "imwrite", "read_text", "write_text"), f"{path} opens a file"
+
+
+PICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve"}
+RUNNING = {"eval", "exec", "compile", "__import__", "os.system", "os.popen", "subprocess.getoutput"}
+# Compiled kernels, in a folder of the user's own, by a digest of the source that they were compiled from.
+KEEPS_KERNELS = "maths/kernels/kept.py"
+
+
+@functools.cache
+def nodes(path: Path) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(path.read_text())))
+
+
+def called(path: Path) -> list[tuple[str, dict[str | None, object]]]:
+    """Whatever a file calls, by the name that it has there, and the constants that are given by name."""
+    calls = [node for node in nodes(path) if isinstance(node, ast.Call)]
+    return [
+        (dotted(call.func), {one.arg: getattr(one.value, "value", one.value) for one in call.keywords})
+        for call in calls
+    ]
+
+
+def dotted(node: ast.AST) -> str:
+    if isinstance(node, ast.Attribute):
+        return f"{dotted(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def imported_modules(path: Path) -> set[str]:
+    found = set()
+    for node in nodes(path):
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found |= {f"{node.module}.{one.name}" for one in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {one.name for one in node.names}
+    return found
+
+
+def test_nothing_from_a_file_is_run():
+    """No pickle, no evaluated text, no shell: what a file or a user says is data."""
+    for path in modules():
+        if path.relative_to(HOUSE).as_posix() != KEEPS_KERNELS:
+            assert not {name.split(".")[0] for name in imported_modules(path)} & PICKLES, (
+                f"{path} can open a pickle"
+            )
+        for name, given in called(path):
+            assert name not in RUNNING, f"{path} calls {name}"
+            assert given.get("shell", False) is False, f"{path} asks a shell"
+            assert given.get("allow_pickle", False) is False, f"{path} opens pickles"
+            assert name not in ("np.load", "numpy.load"), f"{path} reads arrays by another way than states"
+            assert not name.endswith(("yaml.load", "extractall", "unpack_archive")), f"{path} calls {name}"
+
+
+def test_xml_is_read_without_document_types_and_entities():
+    for path in modules():
+        xml = {name for name in imported_modules(path) if name.split(".")[0] in ("xml", "lxml", "defusedxml")}
+        reading = {name for name in xml if not name.startswith("xml.sax.saxutils.")}
+        assert reading <= {"xml.parsers.expat"}, f"{path} reads XML by {reading}"
+        if reading:
+            handled = {node.attr for node in nodes(path) if isinstance(node, ast.Attribute)}
+            assert {"StartDoctypeDeclHandler", "EntityDeclHandler"} <= handled, f"{path} lets entities in"
 
 
 def test_importing_the_package_loads_neither_numba_nor_cv2():
