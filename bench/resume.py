@@ -54,11 +54,12 @@ class Killed:
 
 
 def main() -> None:
-    arguments = _parser().parse_args()
+    own, options = divided(sys.argv[1:])
+    arguments = _parser().parse_args(own)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         video = arguments.video or draw(place / "film.mp4")
-        words = track_words(video, arguments.tracker, arguments.every, arguments.options)
+        words = track_words(video, arguments.tracker, arguments.every, options)
         peaceful = in_peace(words, place / "peace")
         print(f"{peaceful.frames} frames in peace: {peaceful.seconds:.1f} s", flush=True)
         rng, done = random.Random(arguments.seed), []
@@ -70,6 +71,12 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(summary(peaceful, done)))
     sys.exit(0 if all(one.equal for one in done) else 1)
+
+
+def divided(words: list[str]) -> tuple[list[str], list[str]]:
+    """The words of this command, and those behind `--`."""
+    place = words.index("--") if "--" in words else len(words)
+    return words[:place], words[place + 1 :]
 
 
 def draw(path: Path) -> Path:
@@ -168,7 +175,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--every", type=float, default=0.0, help="--checkpoint-every of the runs; 0: all they may")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("options", nargs="*", help="behind --, for perdure track")
     return parser
 
 

@@ -187,6 +187,24 @@ def test_frames_after_a_start_are_those_of_the_whole_film(tmp_path: Path, name: 
         assert all(alike(frame, whole[frame.index]) for frame in part)
 
 
+def test_what_comes_behind_a_frame_is_what_the_whole_source_has_there(tmp_path: Path) -> None:
+    repaired = film(tmp_path / "b.mkv", 12, ticks=[0, 40, 80, 120, 160, 200, 1200, 1240, 1280, 2320, 2360, 2400])
+    images = pngs(tmp_path / "images", [f"{k}.png" for k in range(9)])
+    for path, part in (
+        (film(tmp_path / "a.mp4", 40, b_frames=2), {"start": "7f", "stride": 3}),
+        (repaired, {}),
+        (images, {"stride": 2}),
+    ):
+        whole = list(open_source(path, **part))  # type: ignore[arg-type]
+        for place in (0, 1, len(whole) - 1):
+            source = open_source(path, **part)  # type: ignore[arg-type]
+            rest = list(source.after(whole[place].index))
+            assert [(one.index, one.time) for one in rest] == [(one.index, one.time) for one in whole[place + 1 :]]
+            assert all(alike(*pair) for pair in zip(rest, whole[place + 1 :], strict=True))
+    arrays = open_source(iter([picture(k) for k in range(4)]), fps=10)
+    assert [frame.index for frame in arrays.after(1)] == [2, 3]
+
+
 def test_a_recording_that_begins_between_key_frames_begins_at_the_first(tmp_path: Path) -> None:
     path = film(tmp_path / "a.ts", 40, "mpeg2video")
     place, _ = packets(path)[4]
