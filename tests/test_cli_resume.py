@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import resource
@@ -19,8 +20,11 @@ from perdure import pipeline
 from perdure.cli import resuming
 from perdure.errors import OutputError, ParameterError
 from perdure.files import checkpoints
+from perdure.files.live_events import LiveEvents
 from perdure.files.log import RunLog, read_log
 from perdure.files.mot import write_rows
+from perdure.fold import Step
+from perdure.types import Event, Frame, Regions, Report
 
 RESULTS = ("tracks.jsonl", "tracks.txt", "events.csv")
 PLAIN = ("--no-video", "--tracker", "overlap")
@@ -293,3 +297,56 @@ def test_a_disk_that_becomes_full_is_said_in_a_line_and_everything_before_is_kep
     assert perdure(*words, "--resume", at=place).returncode == 0
     perdure("track", "walk.avi", *PLAIN, "-o", "roomy", at=place)
     assert results(place / "full") == results(place / "roomy")
+
+
+def test_a_film_that_could_not_be_drawn_leaves_the_run_done_and_is_drawn_later(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def full(*_: object) -> None:
+        raise OutputError("no room for the film")
+
+    words = ("track", "walk.avi", "--tracker", "overlap", "-o", "filmless")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("perdure.cli.running.draw_film", full)
+        done = perdure(*words, at=place)
+    assert (done.returncode, "no room for the film" in done.stderr) == (2, True)
+    assert about(place / "filmless")["status"] == "done"
+    assert perdure(*words, "--resume", at=place).returncode == 0
+    assert (place / "filmless/tracked.mp4").exists()
+
+
+def test_what_was_told_as_begun_is_told_as_ended_by_the_run_that_goes_on():
+    lasting, out = Event("loiter", 3, 9, (1,), "door"), io.StringIO()
+    first, again = LiveEvents(io.StringIO()), LiveEvents(out)
+    first.tell(Step(Frame(9, 0.9, None), Regions.empty(), Report(begun=(lasting,))))
+    assert first.lasting == (("loiter", (1,), "door"),)
+    again.go_on(first.lasting, 0.9)
+    again.tell(Step(None, Regions.empty(), Report(events=(lasting,))))
+    told = json.loads(out.getvalue())
+    assert (told["state"], told["time"]) == ("ends", 0.9)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 20 kB, where this user may mount one."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = shutil.which("mount")
+    words = [mount or "", "-t", "tmpfs", "-o", "size=20k", "tmpfs", str(disk)]
+    if mount is None or subprocess.run(words, capture_output=True).returncode:
+        pytest.skip("no disk can be mounted here")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.slow
+def test_a_run_on_a_disk_that_is_full_goes_on_when_there_is_room(place: Path, small_disk: Path):
+    words = ("track", "walk.avi", "--no-video", "--tracker", "compound", "-o", small_disk / "run")
+    done = perdure(*words, at=place)
+    assert (done.returncode, "No space left on device" in done.stderr) == (2, True), done.stderr
+    kept = [entry.frame for entry in read_log(small_disk / "run/tracks.jsonl")]
+    assert kept == list(range(len(kept)))
+    subprocess.run(["mount", "-o", "remount,size=30m", str(small_disk)], check=True)
+    assert perdure(*words, "--resume", at=place).returncode == 0
+    perdure("track", "walk.avi", "--no-video", "--tracker", "compound", "-o", "wide", at=place)
+    assert results(small_disk / "run") == results(place / "wide")
