@@ -20,7 +20,7 @@ from perdure import pipeline
 from perdure.cli import resuming
 from perdure.errors import OutputError, ParameterError
 from perdure.files import checkpoints
-from perdure.files.live_events import LiveEvents
+from perdure.files.live_events import LiveEvents, lines_to
 from perdure.files.log import RunLog, read_log
 from perdure.files.mot import write_rows
 from perdure.fold import Step
@@ -317,7 +317,7 @@ def test_a_film_that_could_not_be_drawn_leaves_the_run_done_and_is_drawn_later(
 
 def test_what_was_told_as_begun_is_told_as_ended_by_the_run_that_goes_on():
     lasting, out = Event("loiter", 3, 9, (1,), "door"), io.StringIO()
-    first, again = LiveEvents(io.StringIO()), LiveEvents(out)
+    first, again = LiveEvents(lines_to(io.StringIO())), LiveEvents(lines_to(out))
     first.tell(Step(Frame(9, 0.9, None), Regions.empty(), Report(begun=(lasting,))))
     assert first.lasting == (("loiter", (1,), "door"),)
     again.go_on(first.lasting, 0.9)

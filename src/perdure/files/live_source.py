@@ -120,6 +120,10 @@ class LiveSource:
         if self._ended:
             raise DamagedVideo(f"{self.name}: {self._ended}", self._next, max(self._last, 0.0))
 
+    def after(self, index: int) -> Iterator[Frame]:
+        """Yield what still comes behind frame `index`; what has passed does not come again."""
+        return (frame for frame in self if frame.index > index)
+
     arrived: float = 0.0  # s of this machine's clock at which the frame came that was taken last
 
     def happened(self) -> tuple[Event, ...]:
