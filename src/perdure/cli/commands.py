@@ -23,6 +23,8 @@ from perdure.cli.export import export
 from perdure.cli.learn import LearnCommand, learn
 from perdure.cli.learn_zones import learn as learn_zones
 from perdure.cli.live import live
+from perdure.cli.run import RunCommand
+from perdure.cli.run import run as run_many
 from perdure.cli.scenarios import scenarios
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
@@ -75,6 +77,7 @@ app.command(cls=LearnCommand)(_interruptible(learn))
 app.command("learn-zones")(_interruptible(learn_zones))
 app.command(cls=ScoreCommand)(_interruptible(score))
 app.command(cls=ViewCommand)(_interruptible(view))
+app.command("run", cls=RunCommand)(_interruptible(run_many))
 
 
 def _print_version(wanted: bool) -> None:

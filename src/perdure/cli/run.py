@@ -1,0 +1,414 @@
+"""`perdure run`: many videos in, a run folder for each out, on all cores or on many machines."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any, Optional
+
+import typer
+from typer.core import TyperCommand
+
+from perdure import cluster, params
+from perdure.cli import options
+from perdure.cli.jobs import (
+    Job,
+    bring,
+    discard,
+    finished,
+    name_of_source,
+    placed,
+    told_apart,
+    work_away,
+    work_here,
+)
+from perdure.cli.progress import watched
+from perdure.cli.spreading import spread
+from perdure.cli.tables import aligned
+from perdure.cluster import Ended, Where
+from perdure.comparison import Window, Wanted, compare_files
+from perdure.detect import DETECTORS
+from perdure.errors import FormatError, ParameterError, PerdureError, VideoError
+from perdure.files.log import read_log
+from perdure.files.runs import Reporting, RunFolder
+from perdure.files.scored import Match, find_truths, paired
+from perdure.files.shapes import is_file
+from perdure.interpret import Feedback
+from perdure.metrics import Score
+from perdure.pipeline import plan
+from perdure.trackers import TRACKERS
+
+SHOWN = ("IDF1", "HOTA", "MOTA", "M")
+_COUNTS = ("frames", "tracks", "rows", "events")
+_FAMILIES = (
+    ("tracker", TRACKERS),
+    ("detector", DETECTORS),
+    ("", {"What counts": Reporting, "Scenarios": Feedback}),
+)
+
+
+class RunCommand(TyperCommand):
+    """Reads `--truth A B` as several, as people write it."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the option before every one of its words, then parse as usual."""
+        return list(super().parse_args(ctx, spread(args, ("--truth",))))
+
+
+SourcesArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="SOURCE...", help="Films, as `perdure track` takes them.", show_default=False),
+]
+OnOption = Annotated[
+    str,
+    typer.Option(
+        "--on",
+        metavar="local|ray[://ADDRESS]",
+        help="'local': processes of this machine; 'ray': a Ray cluster, the one at the address, else that of "
+        "$RAY_ADDRESS, else one that is started here.",
+    ),
+]
+WorkersOption = Annotated[
+    Optional[int],  # noqa: UP045 - typer reads this at run time
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Jobs at a time (default: as many as cores).", show_default=False
+    ),
+]
+TruthsOption = Annotated[
+    Optional[list[Path]],  # noqa: UP045
+    typer.Option(
+        "--truth",
+        metavar="TRUTH...",
+        help="One for each source, of the same names or in the same order: as `perdure score` takes them.",
+        show_default=False,
+    ),
+]
+
+
+@options.with_parameters(*_FAMILIES)
+def run(
+    sources: SourcesArgument,
+    chosen: dict[str, object],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Where a folder for each job goes.")
+    ] = Path("perdure-runs"),
+    on: OnOption = "local",
+    workers: WorkersOption = None,
+    attempts: Annotated[
+        int, typer.Option("--attempts", metavar="N", min=1, help="How often a job is begun whose worker dies.")
+    ] = cluster.ATTEMPTS,
+    truth: TruthsOption = None,
+    tracker: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            metavar="NAME", help="As in `perdure track`; repeated: each on every source.", show_default=False
+        ),
+    ] = None,
+    tracker_settings: options.TrackerSettingsOption = None,
+    tracker_environment: options.TrackerEnvironmentOption = None,
+    detector: Annotated[
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--detector",
+            metavar="NAME|FILE",
+            help="As in `perdure track`; repeated: each on every source. In all names of files, {name} stands for the "
+            "source's name and {folder} for its folder.",
+            show_default=False,
+        ),
+    ] = None,
+    box_masks: options.BoxMasksOption = None,
+    class_names: options.ClassNamesOption = None,
+    init: options.InitOption = None,
+    roi: options.RoiOption = None,
+    calibration: options.CalibrationOption = None,
+    object_height: options.ObjectHeightOption = None,
+    zones: options.ZonesOption = None,
+    class_: options.ClassOption = None,
+    scenarios: options.ScenariosOption = None,
+    context: options.ContextOption = None,
+    embedding: options.EmbeddingOption = None,
+    fps: options.FpsOption = None,
+    start: options.StartOption = None,
+    end: options.EndOption = None,
+    stride: options.StrideOption = 1,
+    parameters: options.ParametersOption = None,
+    video: Annotated[bool, typer.Option("--video", help="Draw tracked.mp4 for each job.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Do anew what was done before.")] = False,
+    json_: options.JsonOption = False,
+) -> None:
+    """Track every moving thing in each of SOURCEs, many at a time, into a folder of runs."""
+    where = Where.of(on)
+    given = options.read_parameters(parameters, chosen)
+    reporting = {name: given.pop(name) for name in list(given) if name == "report_confidence"}
+    settings = {
+        "tracker_settings": tracker_settings,
+        "tracker_environment": tracker_environment,
+        "box_masks": box_masks,
+        "class_names": class_names,
+        "init": init,
+        "roi": roi,
+        "calibration": calibration,
+        "object_height": object_height,
+        "zones": zones,
+        "classes": class_,
+        "scenarios": scenarios,
+        "context": context,
+        "embedding": embedding,
+        "fps": fps,
+        "start": start,
+        "end": end,
+        "stride": stride,
+        "parameters": given,
+    }
+    kinds = list(itertools.product(tracker or [None], detector or [None]))
+    jobs = _jobs(sources, kinds, settings, reporting, video)
+    truths = truths_of(sources, truth or [])
+    if truths and stride != 1:
+        raise ParameterError("--truth and --stride: what is true of frames left out would count as missed")
+    _check(jobs[0])
+    rows = [Row(job, placed(job, output), label) for job, label in zip(jobs, _labels(jobs), strict=True)]
+    _do(rows, where, workers, attempts, overwrite=overwrite)
+    for row in rows:
+        if truths and row.told:
+            row.score(truths[row.job.source], windowed=start is not None or end is not None)
+    print(json.dumps(_value(rows)) if json_ else _page(rows))
+    if code := _code(rows):
+        raise typer.Exit(code)
+
+
+@dataclass
+class Row:
+    """A job, where its run is, and what came of it."""
+
+    job: Job
+    folder: Path
+    label: str
+    told: dict[str, Any] | None = None
+    failure: str = ""
+    defect: str = ""
+    before: bool = False  # done by an earlier call
+    scored: Score | None = None
+
+    @property
+    def word(self) -> str:
+        """How it ended, in a word or two."""
+        if self.told is None:
+            return "failed"
+        return f"{self.told['status']} before" if self.before else str(self.told["status"])
+
+    def score(self, truth: Path, *, windowed: bool) -> None:
+        """Hold the run against its truth, in the frames of the run alone where it is of a part of the source."""
+        window = Window()
+        if windowed:
+            frames = [
+                one.frame for one in read_log(self.folder / "tracks.jsonl", with_masks=False) if one.frame >= 0
+            ]
+            window = Window(min(frames), max(frames)) if frames else window
+        compared = compare_files(Match(self.label, self.folder, truth), Wanted(window=window))
+        self.scored = compared.boxes or compared.masks
+
+
+def truths_of(sources: Sequence[str], truths: Sequence[Path]) -> dict[str, Path]:
+    """Return the truth of each source; empty where none are given.
+
+    Raises
+    ------
+    ParameterError, FormatError
+        Where it cannot be told which belongs to which.
+    """
+    if not truths:
+        return {}
+    found = find_truths(truths)
+    known = {name for name, _ in found}
+
+    def name(source: str) -> str:
+        folder = Path(os.path.abspath(source)).parent.name
+        own = name_of_source(source)
+        return folder if own not in known and folder in known else own
+
+    pairs = paired({one: [(name(one), Path(one))] for one in dict.fromkeys(sources)}, found)
+    if len(set(sources)) > len(found):
+        raise ParameterError(
+            f"{len(set(sources))} sources and {len(found)} truths; give one --truth for each source"
+        )
+    return {source: match.truth for source, match in zip(dict.fromkeys(sources), pairs, strict=True)}
+
+
+def _jobs(
+    sources: Sequence[str],
+    kinds: Sequence[tuple[str | None, str | None]],
+    settings: Mapping[str, Any],
+    reporting: Mapping[str, Any],
+    film: bool,
+) -> list[Job]:
+    """A job for each source and each tracker and detector; one that is asked for twice is done once."""
+    jobs: dict[tuple[str, str | None, str | None], Job] = {}
+    for source, (tracker, detector) in itertools.product(sources, kinds):
+        if source.isdecimal():
+            raise ParameterError(f"camera {source} has no end; `perdure live {source}` follows it")
+        given = {"tracker": tracker, "detector": detector, **settings}
+        own = {name: _own(value, source) for name, value in given.items() if value is not None}
+        jobs.setdefault((source, tracker, detector), Job(_place(source), own, reporting, film))
+    return list(jobs.values())
+
+
+def _own(value: Any, source: str) -> Any:
+    """A setting with the source's own names filled in, and files by their whole names: another machine has other places."""
+    if isinstance(value, list):
+        return [_own(one, source) for one in value]
+    if not isinstance(value, (str, Path)):
+        return value
+    path = Path(os.path.abspath(source))
+    folder = path if path.is_dir() else path.parent
+    text = str(value).replace("{name}", name_of_source(source)).replace("{folder}", str(folder))
+    engine, colon, file = text.partition(":")
+    if colon and is_file(file):
+        return f"{engine}:{os.path.abspath(file)}"
+    return os.path.abspath(text) if is_file(text) else text
+
+
+def _place(source: str) -> str:
+    return source if "://" in source else os.path.abspath(source)
+
+
+def _labels(jobs: Sequence[Job]) -> list[str]:
+    """Names by which the rows of the table are told apart."""
+    names = told_apart([job.source for job in jobs])
+    parts = [names]
+    for key in ("tracker", "detector"):
+        words = [str(job.settings.get(key) or "") for job in jobs]
+        if len(set(words)) > 1:
+            parts.append([word if "/" not in word else Path(word).name for word in words])
+    return [" ".join(filter(None, words)) for words in zip(*parts, strict=True)]
+
+
+def _check(job: Job) -> None:
+    """Find a mistake in what all jobs share before the first begins; what is wrong with one source alone, it tells itself."""
+    params.build(Reporting, job.reporting)
+    with contextlib.suppress(VideoError, FormatError):
+        plan(job.source, **job.settings).source.close()
+
+
+def _do(rows: Sequence[Row], where: Where, workers: int | None, attempts: int, *, overwrite: bool) -> None:
+    """Do all jobs that are not done, and note what came of each."""
+    for row in rows:
+        if not overwrite and (about := finished(row.folder)) is not None:
+            row.told, row.before = {key: about[key] for key in ("status", *_COUNTS) if key in about}, True
+            row.told["message"], row.told["warnings"] = about.get("message", ""), about.get("warnings", [])
+    left = [row for row in rows if row.told is None]
+    tasks = [(row.job, row.folder) for row in left]
+    here = where.kind == cluster.LOCAL
+    work: Callable[[tuple[Job, Path]], Any] = work_here if here else work_away
+    ends: Iterator[Ended[Any]] = cluster.work_at(tasks, work, on=where, workers=workers, attempts=attempts)
+    try:
+        with _stoppable():
+            for ended in watched(ends, "runs", len(tasks), unit="runs"):
+                _note(left[ended.place], ended)
+    except KeyboardInterrupt:
+        done = sum(row.told is not None for row in rows)
+        print(f"perdure: {done} of {len(rows)} jobs are done; the same command goes on", file=sys.stderr)
+        raise
+    finally:
+        for row in left:
+            discard(row.folder)
+
+
+def _note(row: Row, ended: Ended[Any]) -> None:
+    """Note what came of a job; what was done elsewhere is written here."""
+    row.failure, row.defect = ended.failure, ended.defect
+    if ended.value is None:
+        return
+    if isinstance(ended.value, tuple):
+        told, files = ended.value
+        try:
+            bring(row.folder, files)
+        except PerdureError as error:
+            row.failure = str(error)
+            return
+        row.told = told
+    else:
+        row.told = ended.value
+
+
+@contextlib.contextmanager
+def _stoppable() -> Iterator[None]:
+    """Within the context a termination signal ends all as Ctrl-C does: no worker is left behind."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _code(rows: Sequence[Row]) -> int:
+    """0 where all is done, 1 where one met a defect of ours, 2 where none is done, 3 where something is lost."""
+    if any(row.defect for row in rows):
+        return 1
+    if all(row.told is None for row in rows):
+        return 2
+    return 3 if any(row.told is None or row.told["status"] == "damaged" for row in rows) else 0
+
+
+def _together(rows: Sequence[Row]) -> dict[str, Score]:
+    """The scores of all sources together, of each tracker and detector that had several."""
+    groups: dict[str, list[Score]] = {}
+    for row in rows:
+        if row.scored is not None:
+            words = (row.job.settings.get("tracker"), row.job.settings.get("detector"))
+            groups.setdefault(" ".join(Path(word).name for word in words if word), []).append(row.scored)
+    return {f"together {name}".strip(): Score.together(all_) for name, all_ in groups.items() if len(all_) > 1}
+
+
+def _value(rows: Sequence[Row]) -> dict[str, Any]:
+    value: dict[str, Any] = {"jobs": [_row_value(row) for row in rows]}
+    return value | {name: score.figures for name, score in _together(rows).items()}
+
+
+def _row_value(row: Row) -> dict[str, Any]:
+    return {
+        "name": row.label,
+        "source": row.job.source,
+        "job": row.job.key,
+        "run": str(row.folder),
+        "skipped": row.before,
+        **(row.told or {"status": "failed", "message": row.failure}),
+        **({"scores": row.scored.figures} if row.scored else {}),
+    }
+
+
+def _page(rows: Sequence[Row]) -> str:
+    """The table, and what the reader must know of single jobs."""
+    with_scores = any(row.scored for row in rows)
+    heading = ["run", *_COUNTS, "frames/s", *(SHOWN if with_scores else ()), "how it ended"]
+    lines = [heading, *(_cells(row, with_scores) for row in rows)]
+    for name, score in _together(rows).items():
+        lines.append([name, *["-"] * (len(_COUNTS) + 1), *_scores(score), ""])
+    notes = [f"{row.label}: {note}" for row in rows if row.told for note in row.told["warnings"]]
+    notes += [f"{row.label}: {row.told['message']}" for row in rows if row.told and row.told["message"]]
+    notes += [f"{row.label}: {row.failure}" for row in rows if row.failure]
+    notes += [row.defect.rstrip() for row in rows if row.defect]
+    return "\n".join([aligned(lines), *notes, f"results in {rows[0].folder.parent}"])
+
+
+def _cells(row: Row, with_scores: bool) -> list[str]:
+    told = row.told or {}
+    rate = f"{told['rate']:.0f}" if "rate" in told else "-"
+    scores = (_scores(row.scored) if row.scored else ["-"] * len(SHOWN)) if with_scores else []
+    return [row.label, *(str(told.get(name, "-")) for name in _COUNTS), rate, *scores, row.word]
+
+
+def _scores(score: Score) -> list[str]:
+    figures = score.figures
+    return [f"{100 * figures[name]:.1f}" if name in figures else "-" for name in SHOWN]
