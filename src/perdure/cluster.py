@@ -95,7 +95,7 @@ def work_at(
     jobs: Sequence[J],
     work: Callable[[J], R],
     *,
-    on: Where = Where(),  # noqa: B008 - frozen
+    on: Where = Where(),
     workers: int | None = None,
     attempts: int = ATTEMPTS,
 ) -> Iterator[Ended[R]]:
@@ -104,9 +104,11 @@ def work_at(
     Parameters
     ----------
     jobs : sequence of J
+        Picklable.
     work : function of a job
         Of a module, so that another process finds it. It may be called again for a job whose worker died.
     on : Where
+        This machine, or a cluster.
     workers : int or None
         Jobs at a time; None: as many as there are cores. Each has an equal share of the cores for its threads.
     attempts : int
@@ -173,8 +175,14 @@ def _begin_worker(threads: int) -> None:
         os.setpgrp()
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     _use_threads(threads)
+
+
+def _end_with(parent: Any) -> None:
+    """End this process when its parent has ended."""
+    parent.join()
+    os._exit(1)
 
 
 def _use_threads(threads: int) -> None:
@@ -224,7 +232,7 @@ def _on_ray(
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise ParameterError(f"no Ray cluster at {address or 'this machine'}: {error}") from error
     try:
-        remote = ray.remote(num_cpus=1, max_retries=attempts - 1)(_on_ray_worker)
+        remote: Any = ray.remote(num_cpus=1, max_retries=attempts - 1)(_on_ray_worker)
         waiting = {remote.remote(place, work, job): place for place, job in enumerate(jobs)}
         while waiting:
             done, _ = ray.wait(list(waiting), num_returns=1)

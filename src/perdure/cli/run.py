@@ -34,11 +34,11 @@ from perdure.cli.progress import watched
 from perdure.cli.spreading import spread
 from perdure.cli.tables import aligned
 from perdure.cluster import Ended, Where
-from perdure.comparison import Window, Wanted, compare_files
+from perdure.comparison import Wanted, Window, compare_files
 from perdure.detect import DETECTORS
 from perdure.errors import FormatError, ParameterError, PerdureError, VideoError
 from perdure.files.log import read_log
-from perdure.files.runs import Reporting, RunFolder
+from perdure.files.runs import Reporting
 from perdure.files.scored import Match, find_truths, paired
 from perdure.files.shapes import is_file
 from perdure.interpret import Feedback
@@ -168,7 +168,7 @@ def run(
         "stride": stride,
         "parameters": given,
     }
-    kinds = list(itertools.product(tracker or [None], detector or [None]))
+    kinds = [(one, other) for one in tracker or (None,) for other in detector or (None,)]
     jobs = _jobs(sources, kinds, settings, reporting, video)
     truths = truths_of(sources, truth or [])
     if truths and stride != 1:
@@ -217,7 +217,7 @@ class Row:
 
 
 def truths_of(sources: Sequence[str], truths: Sequence[Path]) -> dict[str, Path]:
-    """Return the truth of each source; empty where none are given.
+    """Return the truth of each source, by its whole name; empty where none are given.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def truths_of(sources: Sequence[str], truths: Sequence[Path]) -> dict[str, Path]
         raise ParameterError(
             f"{len(set(sources))} sources and {len(found)} truths; give one --truth for each source"
         )
-    return {source: match.truth for source, match in zip(dict.fromkeys(sources), pairs, strict=True)}
+    return {_place(source): match.truth for source, match in zip(dict.fromkeys(sources), pairs, strict=True)}
 
 
 def _jobs(
