@@ -59,7 +59,7 @@ def test_a_place_that_is_none_is_refused(word: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("on", ["local", "ray"])
 def test_all_results_are_there_and_the_same_when_a_worker_is_killed_in_the_middle_of_a_run(
-    tmp_path: Path, on: str
+    tmp_path: Path, on: str, monkeypatch: pytest.MonkeyPatch
 ):
     if on == "ray" and importlib.util.find_spec("ray") is None:
         pytest.skip("Ray is not installed: pip install 'perdure[ray]'")
