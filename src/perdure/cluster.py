@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from perdure.errors import ParameterError, PerdureError
 
@@ -81,14 +81,44 @@ class Where:
         return Where(RAY, word if colon else "")
 
 
-def workers_of(wanted: int | None, jobs: int) -> int:
-    """Return how many processes work at `jobs` jobs here: as many as wanted or as there are cores, no more than jobs."""
-    return max(1, min(jobs, cores() if wanted is None else wanted))
-
-
 def cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Crew(Protocol):
+    """Workers that stay for several rounds of jobs."""
+
+    def work(self, jobs: Sequence[J], work: Callable[[J], R], attempts: int = ATTEMPTS) -> Iterator[Ended[R]]:
+        """Yield how each job ended, in the order in which they end.
+
+        Parameters
+        ----------
+        jobs : sequence of J
+            Picklable.
+        work : function of a job
+            Of a module, so that another process finds it. It may be called again for a job whose worker died.
+        attempts : int
+            How often a job is begun whose worker dies.
+        """
+        ...
+
+
+@contextlib.contextmanager
+def crew(on: Where, workers: int | None = None) -> Iterator[Crew]:
+    """Have workers at a place; afterwards none is left.
+
+    Parameters
+    ----------
+    on : Where
+        This machine, or a cluster.
+    workers : int or None
+        Jobs at a time; None: as many as there are cores. Each has an equal share of the cores for its threads.
+    """
+    with (
+        _on_ray(on.address, workers) if on.kind == RAY else _local(cores() if workers is None else workers) as made
+    ):
+        yield made
 
 
 def work_at(
@@ -99,25 +129,12 @@ def work_at(
     workers: int | None = None,
     attempts: int = ATTEMPTS,
 ) -> Iterator[Ended[R]]:
-    """Yield how each job ended, in the order in which they end.
-
-    Parameters
-    ----------
-    jobs : sequence of J
-        Picklable.
-    work : function of a job
-        Of a module, so that another process finds it. It may be called again for a job whose worker died.
-    on : Where
-        This machine, or a cluster.
-    workers : int or None
-        Jobs at a time; None: as many as there are cores. Each has an equal share of the cores for its threads.
-    attempts : int
-        How often a job is begun whose worker dies.
-    """
-    if on.kind == RAY:
-        yield from _on_ray(jobs, work, on.address, workers, attempts)
-    else:
-        yield from _local(jobs, work, workers_of(workers, len(jobs)), attempts)
+    """Yield how each of some jobs ended, in the order in which they end; as `crew` and `Crew.work`."""
+    if not jobs:
+        return
+    wanted = cores() if workers is None else workers
+    with crew(on, max(1, min(len(jobs), wanted)) if on.kind == LOCAL else workers) as made:
+        yield from made.work(jobs, work, attempts)
 
 
 def _tried(place: int, work: Callable[[J], R], job: J) -> Ended[R]:
@@ -130,36 +147,52 @@ def _tried(place: int, work: Callable[[J], R], job: J) -> Ended[R]:
         return Ended(place, failure=f"{type(error).__name__}: {error}", defect=traceback.format_exc())
 
 
-def _local(jobs: Sequence[J], work: Callable[[J], R], workers: int, attempts: int) -> Iterator[Ended[R]]:
-    """On processes of this machine, each in a pool of its own, so that one that dies takes no other with it."""
-    waiting = deque((place, 1) for place in range(len(jobs)))
-    threads = max(1, cores() // workers)
-    running: dict[Future[Ended[R]], tuple[int, int, ProcessPoolExecutor]] = {}
-    idle = [_worker(threads) for _ in range(workers if jobs else 0)]
+@contextlib.contextmanager
+def _local(workers: int) -> Iterator[_Local]:
+    """Processes of this machine, which start when they are needed."""
+    made = _Local(max(1, cores() // workers), workers)
     try:
-        while waiting or running:
-            while waiting and idle:
-                pool, (place, attempt) = idle.pop(), waiting.popleft()
-                with _threads_for_children(threads):
-                    running[pool.submit(_tried, place, work, jobs[place])] = place, attempt, pool
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
+        yield made
+    finally:
+        made.end()
+
+
+class _Local:
+    """Processes, each in a pool of its own, so that one that dies takes no other with it."""
+
+    def __init__(self, threads: int, workers: int) -> None:
+        self._threads = threads
+        self._idle = [_worker(threads) for _ in range(workers)]
+        self._running: dict[Future[Any], tuple[int, int, ProcessPoolExecutor]] = {}
+
+    def work(self, jobs: Sequence[J], work: Callable[[J], R], attempts: int = ATTEMPTS) -> Iterator[Ended[R]]:
+        waiting = deque((place, 1) for place in range(len(jobs)))
+        while waiting or self._running:
+            while waiting and self._idle:
+                pool, (place, attempt) = self._idle.pop(), waiting.popleft()
+                with _threads_for_children(self._threads):
+                    future = pool.submit(_tried, place, work, jobs[place])
+                self._running[future] = place, attempt, pool
+            done, _ = wait(self._running, return_when=FIRST_COMPLETED)
             for future in done:
-                place, attempt, pool = running.pop(future)
+                place, attempt, pool = self._running.pop(future)
                 try:
-                    ended = future.result()
-                    idle.append(pool)
+                    ended: Ended[R] = future.result()
+                    self._idle.append(pool)
                 except BrokenProcessPool:
                     pool.shutdown()
-                    idle.append(_worker(threads))
+                    self._idle.append(_worker(self._threads))
                     if attempt < attempts:
                         waiting.appendleft((place, attempt + 1))
                         continue
                     ended = Ended(place, failure=_died(attempts))
                 yield ended
-    finally:
-        for _, _, pool in running.values():
+
+    def end(self) -> None:
+        """End all: at once who is at work, the others in good order."""
+        for _, _, pool in self._running.values():
             _end(pool)
-        for pool in idle:
+        for pool in self._idle:
             pool.shutdown()
 
 
@@ -215,10 +248,9 @@ def _died(attempts: int) -> str:
     return f"the process that worked at it died {times}: killed, or out of memory; try fewer --workers"
 
 
-def _on_ray(
-    jobs: Sequence[J], work: Callable[[J], R], address: str, workers: int | None, attempts: int
-) -> Iterator[Ended[R]]:
-    """On a Ray cluster: the one at the address, else the one of $RAY_ADDRESS, else one that is started here."""
+@contextlib.contextmanager
+def _on_ray(address: str, workers: int | None) -> Iterator[_Ray]:
+    """A Ray cluster: the one at the address, else the one of $RAY_ADDRESS, else one that is started here."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is told to others unless the user wants it
     import ray
 
@@ -226,12 +258,23 @@ def _on_ray(
     if address:
         given["address"] = address
     elif "RAY_ADDRESS" not in os.environ:
-        given |= {"num_cpus": workers_of(workers, len(jobs)), "include_dashboard": False}
+        given |= {"num_cpus": workers or cores(), "include_dashboard": False}
     try:
         ray.init(**given)
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise ParameterError(f"no Ray cluster at {address or 'this machine'}: {error}") from error
     try:
+        yield _Ray()
+    finally:
+        ray.shutdown()
+
+
+class _Ray:
+    """The workers of a cluster, which are Ray's to schedule."""
+
+    def work(self, jobs: Sequence[J], work: Callable[[J], R], attempts: int = ATTEMPTS) -> Iterator[Ended[R]]:
+        import ray
+
         remote: Any = ray.remote(num_cpus=1, max_retries=attempts - 1)(_on_ray_worker)
         waiting = {remote.remote(place, work, job): place for place, job in enumerate(jobs)}
         while waiting:
@@ -243,8 +286,6 @@ def _on_ray(
                 except ray.exceptions.RayError as error:
                     dead = isinstance(error, (ray.exceptions.WorkerCrashedError, ray.exceptions.NodeDiedError))
                     yield Ended(place, failure=_died(attempts) if dead else f"Ray: {error}")
-    finally:
-        ray.shutdown()
 
 
 def _on_ray_worker(place: int, work: Callable[[J], R], job: J) -> Ended[R]:

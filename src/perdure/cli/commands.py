@@ -29,6 +29,7 @@ from perdure.cli.scenarios import scenarios
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
 from perdure.cli.view import ViewCommand, view
+from perdure.cli.tune import TuneCommand, tune
 from perdure.cli.warmup import warmup
 from perdure.errors import DamagedVideo, PerdureError
 
@@ -78,6 +79,7 @@ app.command("learn-zones")(_interruptible(learn_zones))
 app.command(cls=ScoreCommand)(_interruptible(score))
 app.command(cls=ViewCommand)(_interruptible(view))
 app.command("run", cls=RunCommand)(_interruptible(run_many))
+app.command(cls=TuneCommand)(_interruptible(tune))
 
 
 def _print_version(wanted: bool) -> None:

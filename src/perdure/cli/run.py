@@ -254,10 +254,15 @@ def _jobs(
     for source, (tracker, detector) in itertools.product(sources, kinds):
         if source.isdecimal():
             raise ParameterError(f"camera {source} has no end; `perdure live {source}` follows it")
-        given = {"tracker": tracker, "detector": detector, **settings}
-        own = {name: _own(value, source) for name, value in given.items() if value is not None}
-        jobs.setdefault((source, tracker, detector), Job(_place(source), own, reporting, film))
+        own = own_words({"tracker": tracker, "detector": detector, **settings}, source)
+        jobs.setdefault((source, tracker, detector), Job(own.pop("source"), own, reporting, film))
     return list(jobs.values())
+
+
+def own_words(settings: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Return the settings that are given, with a source's own names filled in; and the source by its whole name."""
+    own = {name: _own(value, source) for name, value in settings.items() if value is not None}
+    return {**own, "source": _place(source)}
 
 
 def _own(value: Any, source: str) -> Any:
