@@ -195,7 +195,7 @@ class Gain:
         return self.low > 0.0 and self.segments >= LEAST_SEGMENTS and 2 * self.better > self.pieces
 
 
-def gain(defaults: Sequence[Judged], found: Sequence[Judged], metric: str, seed: int) -> Gain:
+def gain(defaults: Sequence[Judged], found: Sequence[Judged], metric: str, seed: int, draws: int = DRAWS) -> Gain:
     """Return by how much the second are better than the first, piece by piece; with a bootstrap in two stages.
 
     Each draw takes as many pieces as there are, with replacement, and of each as many segments as it has, with
@@ -203,7 +203,7 @@ def gain(defaults: Sequence[Judged], found: Sequence[Judged], metric: str, seed:
     """
     random = np.random.default_rng(seed)
     differences = []
-    for _ in range(DRAWS):
+    for _ in range(draws):
         drawn: tuple[list[Score], list[Score]] = ([], [])
         for place in random.integers(len(defaults), size=len(defaults)).tolist():
             count = len(defaults[place].segments)
