@@ -169,7 +169,7 @@ class Gain:
     default, found : float
         The metric over all held-out pieces, with the defaults, and with what was found without each.
     low, high : float
-        Between them the difference lies in 95 % of the bootstrap's draws.
+        Between them lies the difference in 95 % of the bootstrap's draws, of segments that are scored by themselves.
     better, pieces : int
         In how many of the pieces it was better.
     segments : int
@@ -191,8 +191,9 @@ class Gain:
 
     @property
     def claimed(self) -> bool:
-        """Whether it is more than noise: all of the interval lies above 0, on enough segments, in most pieces."""
-        return self.low > 0.0 and self.segments >= LEAST_SEGMENTS and 2 * self.better > self.pieces
+        """Whether it is more than noise: a gain, an interval above 0, enough segments, better in most pieces."""
+        most = 2 * self.better > self.pieces
+        return self.gain > 0.0 and self.low > 0.0 and self.segments >= LEAST_SEGMENTS and most
 
 
 def gain(defaults: Sequence[Judged], found: Sequence[Judged], metric: str, seed: int, draws: int = DRAWS) -> Gain:

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 from perdure import fold
-from perdure.consistency import agreement, backwards
+from perdure.consistency import backwards
 from perdure.errors import FormatError, ParameterError
 from perdure.files.regions import write_regions
 from perdure.files.scored import read_scored_truth
 from perdure.metrics.compared import compare
-from perdure.metrics.scoring import Score, score_compared
+from perdure.metrics.scoring import score_compared
 from perdure.pipeline import plan
 from perdure.tuning import Judged
 from perdure.types import Rows
 
 LEAST_SEGMENT = 25  # frames
-SEGMENTS = 10  # of a piece, at most
+SEGMENTS = 5  # of a piece, at most
 
 
 @dataclass(frozen=True)
@@ -132,12 +132,7 @@ def _judged(said: Rows, true: Rows, piece: Piece) -> Judged:
         score_compared(compare(said.between(begin, end - 1), true.between(begin, end - 1)))
         for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)
     ]
-    return Judged(score_of(said, true), tuple(segments))
-
-
-def score_of(said: Rows, true: Rows) -> Score:
-    """Score rows against rows."""
-    return agreement(said, true)
+    return Judged(score_compared(compare(said, true)), tuple(segments))
 
 
 def _bare(rows: Rows) -> Rows:

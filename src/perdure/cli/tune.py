@@ -264,8 +264,9 @@ def _verdict(outcome: Outcome, metric: str, *, truths: bool) -> str:
     where = f"on what the search had not seen; better in {one.better} of {one.pieces} parts"
     what = metric if truths else f"agreement with itself ({metric}), which is not truth,"
     if one.claimed:
-        return f"better by {100 * one.gain:.1f} points of {what} {where} ({interval})"
-    return f"no gain is shown: {100 * one.gain:+.1f} points of {what} {where}; within the noise ({interval})"
+        return f"better by {100 * one.gain:.1f} points of {what} {where} ({interval} of segments)"
+    why = "within the noise" if one.gain > 0 else "no better than the defaults"
+    return f"no gain is shown: {100 * one.gain:+.1f} points of {what} {where}; {why} ({interval} of segments)"
 
 
 def _page(outcome: Outcome, spans: Sequence[Span], metric: str, output: Path, *, truths: bool) -> str:
