@@ -47,7 +47,10 @@ def test_every_option_that_the_documents_name_exists():
         "check",
         "report-confidence",
         "no-deps",
-    }  # ours, ruff's, one read off its declaration, pip's
+        "head",
+        "port",
+        "address",
+    }  # ours, ruff's, one read off its declaration, pip's, Ray's
     assert {one for one in named if one not in declared | elsewhere and f'"--{one}"' not in source} - {
         "tracker"
     } == set()

@@ -317,6 +317,8 @@ def _do(rows: Sequence[Row], where: Where, workers: int | None, attempts: int, *
         with _stoppable():
             for ended in watched(ends, "runs", len(tasks), unit="runs"):
                 _note(left[ended.place], ended)
+                if not sys.stderr.isatty():
+                    print(f"perdure: {left[ended.place].label}: {left[ended.place].word}", file=sys.stderr)
     except KeyboardInterrupt:
         done = sum(row.told is not None for row in rows)
         print(f"perdure: {done} of {len(rows)} jobs are done; the same command goes on", file=sys.stderr)
