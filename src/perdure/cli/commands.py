@@ -28,8 +28,8 @@ from perdure.cli.run import run as run_many
 from perdure.cli.scenarios import scenarios
 from perdure.cli.score import ScoreCommand, score
 from perdure.cli.track import track
-from perdure.cli.view import ViewCommand, view
 from perdure.cli.tune import TuneCommand, tune
+from perdure.cli.view import ViewCommand, view
 from perdure.cli.warmup import warmup
 from perdure.errors import DamagedVideo, PerdureError
 

@@ -314,7 +314,7 @@ def _do(rows: Sequence[Row], where: Where, workers: int | None, attempts: int, *
     work: Callable[[tuple[Job, Path]], Any] = work_here if here else work_away
     ends: Iterator[Ended[Any]] = cluster.work_at(tasks, work, on=where, workers=workers, attempts=attempts)
     try:
-        with _stoppable():
+        with stoppable():
             for ended in watched(ends, "runs", len(tasks), unit="runs"):
                 _note(left[ended.place], ended)
                 if not sys.stderr.isatty():
@@ -346,7 +346,7 @@ def _note(row: Row, ended: Ended[Any]) -> None:
 
 
 @contextlib.contextmanager
-def _stoppable() -> Iterator[None]:
+def stoppable() -> Iterator[None]:
     """Within the context a termination signal ends all as Ctrl-C does: no worker is left behind."""
 
     def stop(number: int, frame: FrameType | None) -> None:

@@ -24,6 +24,7 @@ from perdure.cli.run import (
     TruthsOption,
     WorkersOption,
     own_words,
+    stoppable,
     truths_of,
 )
 from perdure.cli.tables import aligned
@@ -104,7 +105,11 @@ def tune(
     if not truths and not fixed:
         raise ParameterError("without --truth only a tracker's parameters can be tuned, on regions detected once")
     pieces = _pieces(sources, {**settings, "parameters": given}, truths)
-    with tempfile.TemporaryDirectory(prefix="perdure-") as place, cluster.crew(where, workers) as crew:
+    with (
+        stoppable(),
+        tempfile.TemporaryDirectory(prefix="perdure-") as place,
+        cluster.crew(where, workers) as crew,
+    ):
         lab = _Lab(crew, pieces, metric)
         if fixed and (where.kind == cluster.LOCAL or not truths):
             lab.recorded(Path(place))
