@@ -9,7 +9,6 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any, Optional
@@ -32,22 +31,17 @@ from perdure.cli.jobs import (
 )
 from perdure.cli.progress import watched
 from perdure.cli.spreading import spread
-from perdure.cli.tables import aligned
+from perdure.cli.summary import COUNTS, Row, code_of, page, value_of
 from perdure.cluster import Ended, Where
-from perdure.comparison import Wanted, Window, compare_files
 from perdure.detect import DETECTORS
 from perdure.errors import FormatError, ParameterError, PerdureError, VideoError
-from perdure.files.log import read_log
 from perdure.files.runs import Reporting
-from perdure.files.scored import Match, find_truths, paired
+from perdure.files.scored import find_truths, paired
 from perdure.files.shapes import is_file
 from perdure.interpret import Feedback
-from perdure.metrics import Score
 from perdure.pipeline import plan
 from perdure.trackers import TRACKERS
 
-SHOWN = ("IDF1", "HOTA", "MOTA", "M")
-_COUNTS = ("frames", "tracks", "rows", "events")
 _FAMILIES = (
     ("tracker", TRACKERS),
     ("detector", DETECTORS),
@@ -179,41 +173,9 @@ def run(
     for row in rows:
         if truths and row.told:
             row.score(truths[row.job.source], windowed=start is not None or end is not None)
-    print(json.dumps(_value(rows)) if json_ else _page(rows))
-    if code := _code(rows):
+    print(json.dumps(value_of(rows)) if json_ else page(rows))
+    if code := code_of(rows):
         raise typer.Exit(code)
-
-
-@dataclass
-class Row:
-    """A job, where its run is, and what came of it."""
-
-    job: Job
-    folder: Path
-    label: str
-    told: dict[str, Any] | None = None
-    failure: str = ""
-    defect: str = ""
-    before: bool = False  # done by an earlier call
-    scored: Score | None = None
-
-    @property
-    def word(self) -> str:
-        """How it ended, in a word or two."""
-        if self.told is None:
-            return "failed"
-        return f"{self.told['status']} before" if self.before else str(self.told["status"])
-
-    def score(self, truth: Path, *, windowed: bool) -> None:
-        """Hold the run against its truth, in the frames of the run alone where it is of a part of the source."""
-        window = Window()
-        if windowed:
-            frames = [
-                one.frame for one in read_log(self.folder / "tracks.jsonl", with_masks=False) if one.frame >= 0
-            ]
-            window = Window(min(frames), max(frames)) if frames else window
-        compared = compare_files(Match(self.label, self.folder, truth), Wanted(window=window))
-        self.scored = compared.boxes or compared.masks
 
 
 def truths_of(sources: Sequence[str], truths: Sequence[Path]) -> dict[str, Path]:
@@ -306,7 +268,7 @@ def _do(rows: Sequence[Row], where: Where, workers: int | None, attempts: int, *
     """Do all jobs that are not done, and note what came of each."""
     for row in rows:
         if not overwrite and (about := finished(row.folder)) is not None:
-            row.told, row.before = {key: about[key] for key in ("status", *_COUNTS) if key in about}, True
+            row.told, row.before = {key: about[key] for key in ("status", *COUNTS) if key in about}, True
             row.told["message"], row.told["warnings"] = about.get("message", ""), about.get("warnings", [])
     left = [row for row in rows if row.told is None]
     tasks = [(row.job, row.folder) for row in left]
@@ -357,65 +319,3 @@ def stoppable() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _code(rows: Sequence[Row]) -> int:
-    """0 where all is done, 1 where one met a defect of ours, 2 where none is done, 3 where something is lost."""
-    if any(row.defect for row in rows):
-        return 1
-    if all(row.told is None for row in rows):
-        return 2
-    return 3 if any(row.told is None or row.told["status"] == "damaged" for row in rows) else 0
-
-
-def _together(rows: Sequence[Row]) -> dict[str, Score]:
-    """The scores of all sources together, of each tracker and detector that had several."""
-    groups: dict[str, list[Score]] = {}
-    for row in rows:
-        if row.scored is not None:
-            words = (row.job.settings.get("tracker"), row.job.settings.get("detector"))
-            groups.setdefault(" ".join(Path(word).name for word in words if word), []).append(row.scored)
-    return {f"together {name}".strip(): Score.together(all_) for name, all_ in groups.items() if len(all_) > 1}
-
-
-def _value(rows: Sequence[Row]) -> dict[str, Any]:
-    value: dict[str, Any] = {"jobs": [_row_value(row) for row in rows]}
-    return value | {name: score.figures for name, score in _together(rows).items()}
-
-
-def _row_value(row: Row) -> dict[str, Any]:
-    return {
-        "name": row.label,
-        "source": row.job.source,
-        "job": row.job.key,
-        "run": str(row.folder),
-        "skipped": row.before,
-        **(row.told or {"status": "failed", "message": row.failure}),
-        **({"scores": row.scored.figures} if row.scored else {}),
-    }
-
-
-def _page(rows: Sequence[Row]) -> str:
-    """The table, and what the reader must know of single jobs."""
-    with_scores = any(row.scored for row in rows)
-    heading = ["run", *_COUNTS, "frames/s", *(SHOWN if with_scores else ()), "how it ended"]
-    lines = [heading, *(_cells(row, with_scores) for row in rows)]
-    for name, score in _together(rows).items():
-        lines.append([name, *["-"] * (len(_COUNTS) + 1), *_scores(score), ""])
-    notes = [f"{row.label}: {note}" for row in rows if row.told for note in row.told["warnings"]]
-    notes += [f"{row.label}: {row.told['message']}" for row in rows if row.told and row.told["message"]]
-    notes += [f"{row.label}: {row.failure}" for row in rows if row.failure]
-    notes += [row.defect.rstrip() for row in rows if row.defect]
-    return "\n".join([aligned(lines), *notes, f"results in {rows[0].folder.parent}"])
-
-
-def _cells(row: Row, with_scores: bool) -> list[str]:
-    told = row.told or {}
-    rate = f"{told['rate']:.0f}" if "rate" in told else "-"
-    scores = (_scores(row.scored) if row.scored else ["-"] * len(SHOWN)) if with_scores else []
-    return [row.label, *(str(told.get(name, "-")) for name in _COUNTS), rate, *scores, row.word]
-
-
-def _scores(score: Score) -> list[str]:
-    figures = score.figures
-    return [f"{100 * figures[name]:.1f}" if name in figures else "-" for name in SHOWN]
