@@ -19,7 +19,7 @@ from perdure.files.regions import read_regions, write_regions
 from perdure.metrics import Score, score
 from perdure.pipeline import plan
 from perdure.trackers import TRACKERS
-from perdure.tuning import Judged, Span, gain, search, span_of
+from perdure.tuning import Judged, Part, Span, figure, gain, search, span_of
 from perdure.types import Tracks
 
 pytest.importorskip("optuna", reason="pip install 'perdure[tune]'")
@@ -74,7 +74,7 @@ def segment(found: int, of: int = 10) -> Score:
 
 def judged(*found: int) -> Judged:
     parts = [segment(one) for one in found]
-    return Judged(Score.together(parts), tuple(parts))
+    return Judged(Part(Score.together(parts)), tuple(Part(one) for one in parts))
 
 
 def test_a_gain_in_every_segment_is_claimed():
@@ -92,6 +92,12 @@ def test_a_gain_that_one_segment_makes_is_within_the_noise():
     )
     assert told.gain > 0
     assert not told.claimed
+
+
+def test_without_truth_it_counts_for_as_much_what_a_run_explains():
+    agreed = segment(10)
+    assert figure([Part(agreed)], "IDF1") == 1.0
+    assert figure([Part(agreed, explained=0.25)], "IDF1") == 0.5
 
 
 def test_few_segments_carry_no_claim():

@@ -153,11 +153,19 @@ def _suggested(trial: object, span: Span) -> list[tuple[str, Value]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
-    """The score of one piece of the material, and of each of its segments in time."""
+class Part:
+    """The score of a part of the material; without truth, also how much of what was seen the run explains, in [0, 1]."""
 
-    whole: Score
-    segments: tuple[Score, ...]
+    score: Score
+    explained: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One piece of the material, and each of its segments in time."""
+
+    whole: Part
+    segments: tuple[Part, ...]
 
 
 @dataclass(frozen=True)
@@ -205,7 +213,7 @@ def gain(defaults: Sequence[Judged], found: Sequence[Judged], metric: str, seed:
     random = np.random.default_rng(seed)
     differences = []
     for _ in range(draws):
-        drawn: tuple[list[Score], list[Score]] = ([], [])
+        drawn: tuple[list[Part], list[Part]] = ([], [])
         for place in random.integers(len(defaults), size=len(defaults)).tolist():
             count = len(defaults[place].segments)
             for segment in random.integers(count, size=count).tolist():
@@ -225,9 +233,15 @@ def gain(defaults: Sequence[Judged], found: Sequence[Judged], metric: str, seed:
     )
 
 
-def figure(scores: Sequence[Score], metric: str) -> float:
-    """Return one figure of several scores together."""
-    together = Score.together(scores)
+def figure(parts: Sequence[Part], metric: str) -> float:
+    """Return what several parts are worth together: the metric; without truth, its geometric mean with what is explained."""
+    value = _metric(Score.together([one.score for one in parts]), metric)
+    shares = [one.explained for one in parts if one.explained is not None]
+    return math.sqrt(max(0.0, value) * sum(shares) / len(shares)) if shares else value
+
+
+def _metric(together: Score, metric: str) -> float:
+    """One figure of a score."""
     if metric == "IDF1":
         return float(together.identity.f1)
     if metric == "HOTA":

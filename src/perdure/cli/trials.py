@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 from perdure import fold
-from perdure.consistency import backwards
+from perdure.consistency import backwards, explained
 from perdure.errors import FormatError, ParameterError
-from perdure.files.regions import write_regions
+from perdure.files.regions import read_regions, write_regions
 from perdure.files.scored import read_scored_truth
 from perdure.metrics.compared import compare
 from perdure.metrics.scoring import score_compared
 from perdure.pipeline import plan
-from perdure.tuning import Judged
-from perdure.types import Rows
+from perdure.tuning import Judged, Part
+from perdure.types import Rows, Tracks
 
 LEAST_SEGMENT = 25  # frames
 SEGMENTS = 5  # of a piece, at most
@@ -92,7 +92,7 @@ def judge(task: tuple[Piece, Mapping[str, Any]]) -> Judged:
     try:
         with contextlib.redirect_stderr(io.StringIO()):
             steps = made.prepared().steps()
-            said = Rows.of_tracks(fold.settle(step.report for step in steps).counted())
+            tracks = fold.settle(step.report for step in steps)
             if piece.truth is None:
                 back = backwards(made, piece.first, piece.end, piece.settings.get("fps"))
                 true = Rows.of_tracks(back.counted())
@@ -100,7 +100,7 @@ def judge(task: tuple[Piece, Mapping[str, Any]]) -> Judged:
                 true = true_rows(piece.truth).between(piece.first, piece.end - 1)
     finally:
         made.source.close()
-    return _judged(_bare(said), _bare(true), piece)
+    return _judged(tracks.counted(), _bare(true), piece)
 
 
 def true_rows(path: Path) -> Rows:
@@ -125,14 +125,22 @@ def _plan(piece: Piece, parameters: Mapping[str, Any]) -> Any:
     return plan(piece.source, **settings, start=f"{piece.first}f", end=f"{piece.end}f")
 
 
-def _judged(said: Rows, true: Rows, piece: Piece) -> Judged:
+def _judged(counted: Tracks, true: Rows, piece: Piece) -> Judged:
+    """Hold a run against what is true, as a whole and by segments."""
+    said = _bare(Rows.of_tracks(counted))
+    regions = dict(read_regions(piece.regions)) if piece.truth is None and piece.regions is not None else None
     count = max(1, min(SEGMENTS, (piece.end - piece.first) // LEAST_SEGMENT))
     cuts = np.linspace(piece.first, piece.end, count + 1).astype(int)
-    segments = [
-        score_compared(compare(said.between(begin, end - 1), true.between(begin, end - 1)))
-        for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)
-    ]
-    return Judged(score_compared(compare(said, true)), tuple(segments))
+
+    def part(begin: int, end: int) -> Part:
+        score = score_compared(compare(said.between(begin, end - 1), true.between(begin, end - 1)))
+        if regions is None:
+            return Part(score)
+        rows = counted.take((counted.frames >= begin) & (counted.frames < end))
+        return Part(score, explained(rows, {frame: one for frame, one in regions.items() if begin <= frame < end}))
+
+    parts = [part(begin, end) for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)]
+    return Judged(part(piece.first, piece.end), tuple(parts))
 
 
 def _bare(rows: Rows) -> Rows:

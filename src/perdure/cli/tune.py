@@ -267,7 +267,7 @@ def _verdict(outcome: Outcome, metric: str, *, truths: bool) -> str:
     one = outcome.gain
     interval = f"95 % interval {100 * one.low:+.1f} to {100 * one.high:+.1f}"
     where = f"on what the search had not seen; better in {one.better} of {one.pieces} parts"
-    what = metric if truths else f"agreement with itself ({metric}), which is not truth,"
+    what = metric if truths else f"agreement with itself ({metric}, and what it explains), which is not truth,"
     if one.claimed:
         return f"better by {100 * one.gain:.1f} points of {what} {where} ({interval} of segments)"
     why = "within the noise" if one.gain > 0 else "no better than the defaults"
@@ -282,7 +282,7 @@ def _page(outcome: Outcome, spans: Sequence[Span], metric: str, output: Path, *,
         rows.append([span.name, _shown(span.default), _shown(found), span.text])
     one = outcome.gain
     scores = [
-        [f"{metric}, %", "default", "found"],
+        [f"{metric}, %" if truths else "self-score, %", "default", "found"],
         ["not seen by the search", f"{100 * one.default:.1f}", f"{100 * one.found:.1f}"],
         ["seen by the search", f"{100 * outcome.seen_default:.1f}", f"{100 * outcome.seen:.1f}"],
     ]
