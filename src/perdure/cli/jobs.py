@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from perdure import __version__, params
-from perdure.cli.track import run
+from perdure.cli.running import run
 from perdure.detection import file_of
 from perdure.errors import FormatError, PerdureError
 from perdure.files.runs import Reporting, RunFolder
