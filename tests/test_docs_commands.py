@@ -37,7 +37,20 @@ DECLARED = {
 }
 TYPED = [command for page in PAGES for command in typed(page)]
 OURS = [command for command in TYPED if command.words[0] == "perdure"]
-OTHERS = {"pip", "python3", "python", "~/peers/bin/pip", ".", "bash", "ruff", "mypy", "pytest", "mkdocs", "jq", "ray"}
+OTHERS = {
+    "pip",
+    "python3",
+    "python",
+    "~/peers/bin/pip",
+    ".",
+    "bash",
+    "ruff",
+    "mypy",
+    "pytest",
+    "mkdocs",
+    "jq",
+    "ray",
+}
 ABSENT = {  # what a command needs that no test has
     r"\blive\b": "a camera, or a stream",
     r"^view\b": "a browser: it serves until it is ended",

@@ -1,4 +1,4 @@
-"""Long runs; `pytest -m slow` runs the long ones, and so does CI."""
+"""Long runs: of some thousand frames by `pytest -m slow`, the longest, which take an hour, by `pytest -n 0 -m endless`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_memory_does_not_grow_with_the_length_of_the_video(tmp_path: Path):
     assert peaks[20_000] <= 1.1 * peaks[2_000], peaks
 
 
-@pytest.mark.slow
+@pytest.mark.endless
 @pytest.mark.parametrize("tracker", TRACKERS)
 def test_neither_memory_nor_the_work_for_a_frame_grows_along_a_video(tmp_path: Path, tracker: str):
     length = LENGTHS.get(tracker, 5_000)
