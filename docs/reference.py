@@ -26,7 +26,7 @@ from perdure.trackers import TRACKERS
 
 DOCS = Path(__file__).parent
 FAMILIES: Mapping[str, tuple[str, Mapping[str, type[Any]]]] = {
-    "Trackers": ("Of `perdure track` and `live`, by `--tracker`.", TRACKERS),
+    "Trackers": ("Of `perdure track` and `live`, by `--tracker`.", dict(sorted(TRACKERS.items()))),
     "Detectors": (
         "Of `perdure track`, `live`, `detect`, `calibrate` and `context`, by `--detector`.",
         {"background": DETECTORS["background"], "people": DETECTORS["people"], "recorded": DETECTORS["recorded"]}

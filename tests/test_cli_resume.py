@@ -105,6 +105,7 @@ def test_every_tracker_is_gone_on_with_whatever_is_around_it(place: Path, words:
         assert results(run) == results(place / "whole")
 
 
+@pytest.mark.slow
 def test_runs_that_are_killed_at_any_moment_are_gone_on_with(place: Path):
     program = Path(__file__).parent / "killed.py"
     words = [sys.executable, str(program), str(place / "walk.avi"), str(place / "kills"), "5"]

@@ -39,6 +39,7 @@ def test_neither_memory_nor_the_work_for_a_frame_grows_along_a_video(tmp_path: P
     assert endured.time_growth <= 0.25, endured.looks
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_along_a_thousand_frames(tmp_path: Path):
     repeat(endurance.meeting(tmp_path / "film.avi"), tmp_path / "long.avi", 1_000)
     endured = endurance.endure(tmp_path / "long.avi", tmp_path / "run", ["--tracker", "overlap"])

@@ -281,6 +281,7 @@ def test_the_page_tells_how_it_is_on_this_machine_alone():
     assert 'class="bad"' in page({"state": "waiting for the source", "why": "no route"})
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_gone_for_a_while_is_followed_on(tmp_path: Path):
     """An RTSP camera on this machine shows one who walks; it is cut off, and comes back: one id, and a gap in the log."""
     floor = np.random.default_rng(0).integers(60, 120, (96, 160, 3), np.uint8)

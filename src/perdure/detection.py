@@ -43,7 +43,9 @@ def detector_name(detector: AnyDetector | None) -> str:
     if word in _NAMED:
         return word
     if colon and engine.isalnum() and len(engine) > 1 and file and "://" not in word:
-        raise ParameterError(f"--detector {word}: {unknown_name('kind of network', engine, ENGINES)}")
+        raise ParameterError(
+            f"--detector {word}: {unknown_name('kind of network', engine, ENGINES)} Networks are named as onnx:FILE"
+        )
     ending = Path(word).suffix.lower()
     if ending in (".onnx", ".xml"):
         engine = "onnx" if ending == ".onnx" else "openvino"

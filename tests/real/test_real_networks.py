@@ -58,6 +58,7 @@ def test_the_layout_of_yolox_is_known_and_its_classes_are_those_of_coco():
     assert model.layout.fit.about() == "416x416, in the corner, BGR 0 to 255"
 
 
+@pytest.mark.slow
 def test_a_network_says_the_same_bytes_in_any_process_with_any_number_of_threads(tmp_path):
     pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
     digests = set()

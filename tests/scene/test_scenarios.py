@@ -281,7 +281,7 @@ def noisy() -> World:
     return World((*leaves, *specks, *people), count=75)
 
 
-SLOW = [pytest.param(one, marks=pytest.mark.slow) if one == "contour" else one for one in TRACKERS]
+SLOW = [pytest.param(one, marks=pytest.mark.slow) if one in ("contour", "trackcut") else one for one in TRACKERS]
 
 
 @pytest.mark.parametrize("kind", SLOW)
