@@ -55,8 +55,8 @@ class Ended(Generic[R]):
 class Where:
     """Where jobs are worked at: 'local' or 'ray', with the address of the cluster, if it is not to be found or started.
 
-    >>> Where.of("ray://head:10001")
-    Where(kind='ray', address='ray://head:10001')
+    >>> Where.of("local")
+    Where(kind='local', address='')
     """
 
     kind: str = LOCAL
