@@ -34,7 +34,8 @@ def stand_ins(place: Path) -> Path:
     write_film(place / "street.mp4", world)
     write_film(place / "clip.mp4", square(SHORT))
     os.link(place / "street.mp4", place / "yard.mp4")
-    os.link(place / "clip.mp4", place / "dish.mp4")
+    for name in ("dish.mp4", "d.mp4"):
+        os.link(place / "clip.mp4", place / name)
     boxes_and_truths(place, truth)
     masks(place)
     places(place)
@@ -70,6 +71,7 @@ def write_film(path: Path, world: World) -> None:
 
 def boxes_and_truths(place: Path, truth: Tracks) -> None:
     """The truth under every name that it has in the docs, and as a detector's boxes."""
+    (place / "better.json").write_text('{"patience": 2.5}\n', encoding="utf-8")  # as `perdure tune` writes it
     for name in ("gt.txt", "street/gt/gt.txt", "yard/gt/gt.txt"):
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         with (place / name).open("w", encoding="utf-8") as file:
