@@ -17,8 +17,9 @@ from perdure.metrics.clear import clear
 from perdure.trackers.compound import Compound
 from perdure.trackers.compound.bodies import Bodies, learnt
 from perdure.trackers.compound.companies import Pair, accompany
+from perdure.trackers.compound.darting import darted
 from perdure.trackers.compound.identity import by_motion, by_order, is_rigid
-from perdure.trackers.compound.matrix import Thresholds, distances, match
+from perdure.trackers.compound.matrix import Matched, Thresholds, distances, match
 from perdure.trackers.compound.targets import (
     CENTRE,
     Targets,
@@ -701,6 +702,84 @@ def test_a_bag_that_is_left_behind_was_nobody_before():
     )
     told = story(world)
     assert not told.told("mended")
+
+
+def two_flies(parted: tuple[int, int], count: int) -> World:
+    """Two of a size, who touch but for some frames, in which a gap is between them that one of them makes."""
+
+    def gap(k: int) -> int:
+        return 14 if parted[0] <= k < parted[1] else 0
+
+    return street(
+        Block(lambda k: (100, 100), (50, 24), RED),
+        Block(lambda k: (150 + gap(k), 104), (50, 24), BLUE),
+        count=count,
+    )
+
+
+def test_two_of_a_size_who_touch_from_the_beginning_are_two_once_they_were_apart_for_a_second():
+    told = story(two_flies((20, 45), 70))
+    bodies = told.tracks.take(~told.tracks.is_group)
+    assert set(bodies.ids.tolist()) == {1, 2}
+    assert [bodies.in_frame(k).ids.tolist() for k in (0, 10, 30, 60)] == [[1, 2]] * 4
+    (mended,) = [one for one in told.events if one.kind == "mended"]
+    assert mended.ids == (1, 2)
+
+
+def test_what_comes_in_two_for_a_moment_is_one():
+    told = story(two_flies((20, 28), 60))
+    assert set(told.tracks.ids.tolist()) == {1}
+
+
+# ---- who darts off -----------------------------------------------------------------------------------------------
+
+
+def darter(count: int = 40) -> Block:
+    """A fish that swims a little at a time, and in frame 20 flees by one and a half of its length."""
+    return Block(lambda k: (60 + 2 * k + (75 if k >= 20 else 0), 60 + (20 if k >= 20 else 0)), (50, 12), RED)
+
+
+def test_who_flees_farther_than_her_length_in_one_frame_is_still_herself():
+    told = story(street(darter(), count=40))
+    assert set(told.tracks.ids.tolist()) == {1}
+    assert not told.told("suspended", "found_again")
+    assert (np.bincount(told.tracks.frames, minlength=40) == 1).all()
+
+
+def test_a_shoal_that_flees_at_once_keeps_its_names():
+    fish = [
+        Block(lambda k, x=x, y=y: (x + 2 * k + (70 if k >= 20 else 0), y), (50, 12), RED)
+        for x, y in ((20, 40), (85, 60), (30, 90))
+    ]
+    world = street(*fish, count=40)
+    told = story(world).tracks
+    assert [names(told, world, k) for k in (10, 30)] == [[1, 2, 3], [1, 2, 3]]
+
+
+def darts(regions: list[list[int]], targets: list[list[int]], pairs: list[list[int]]) -> list[list[int]]:
+    """The (target, region) pairs once those left over have been looked at, in a picture of 320x240."""
+    boxes = [np.array(some, np.float32) for some in (regions, targets)]
+    found = Matched(np.array(pairs, np.intp).reshape(-1, 2), ())
+    sure, eager = np.ones(len(regions), np.bool_), np.ones(len(targets), np.bool_)
+    return darted(found, boxes[0], sure, boxes[1], eager, None, (240, 320)).pairs.tolist()
+
+
+def test_who_is_gone_is_the_one_who_is_new_two_lengths_away_and_not_farther():
+    assert darts([[100, 40, 140, 50]], [[30, 40, 70, 50]], []) == [[0, 0]]
+    assert darts([[130, 40, 170, 50]], [[30, 40, 70, 50]], []) == []
+    assert darts([[100, 40, 118, 50]], [[30, 40, 70, 50]], []) == []  # another, by size
+
+
+def test_who_is_covered_by_another_has_not_darted_off_nor_who_goes_out_of_the_picture():
+    cover, elsewhere, covered = [20, 20, 80, 90], [100, 40, 140, 50], [40, 40, 75, 50]
+    assert darts([cover, elsewhere], [cover, covered], [[0, 0]]) == [[0, 0]]
+    assert darts([[280, 40, 320, 50]], [[230, 40, 270, 50]], []) == []
+
+
+def test_of_a_shoal_the_paths_are_chosen_that_are_shortest_together():
+    before = [[30, 40, 70, 50], [90, 40, 130, 50]]
+    after = [[85, 20, 125, 30], [145, 20, 185, 30]]  # the first is now near where the second was
+    assert darts(after, before, []) == [[0, 0], [1, 1]]
 
 
 # ---- boxes that jitter -------------------------------------------------------------------------------------------

@@ -21,6 +21,8 @@ _FILLED = 0.6  # of a region, that its targets fill at least
 _OWN = 0.5  # share that is granted to whoever has a region for herself
 _SPECK = 0.1  # of a target's area; a smaller region does not hold it while there are others
 _OVER = 0.5  # share of a member in another's region, where she may have gone
+_TORN = 1.0  # s in pieces, after which a target may be two
+_TWINS = 0.4  # area of the smaller of two, in areas of the larger
 _PIECE = 0.5  # of a region inside a target, that makes it a piece
 
 
@@ -32,6 +34,7 @@ class Held(NamedTuple):
     share: Float  # (N,) of its form that is seen; 1 where it has a region by itself
     masks: dict[int, Mask]  # row -> own pixels, of targets fitted into a knot
     pieces: dict[int, tuple[int, ...]]  # row -> further regions that are pieces of it
+    parted: set[int]  # rows whose pieces have turned out to be others
 
 
 class Sight(NamedTuple):
@@ -66,7 +69,7 @@ def gather(
         What is seen, and what is known of the place.
     """
     count = len(targets)
-    held = Held(np.full(count, -1, np.intp), expected.copy(), np.zeros(count, np.float32), {}, {})
+    held = Held(np.full(count, -1, np.intp), expected.copy(), np.zeros(count, np.float32), {}, {}, set())
     rows, regions = active[found.pairs[:, 0]], found.pairs[:, 1]
     single = ~targets.temporary[rows]
     held.region[rows[single]], held.share[rows[single]] = regions[single], 1.0
@@ -106,7 +109,7 @@ def _decided(
     share = np.full((len(knots), len(targets)), -1.0, np.float32)  # (K, N); of who is not in a knot -1
     for one, (knot, some) in enumerate(zip(knots, members, strict=True)):
         if np.isin(some, twice).any():
-            trial = Held(held.region.copy(), held.boxes.copy(), held.share.copy(), {}, {})
+            trial = Held(held.region.copy(), held.boxes.copy(), held.share.copy(), {}, {}, set())
             _place(trial, targets, some, np.array(knot.regions), expected, sight)
             share[one, some] = trial.share[some]
     best = share.argmax(axis=0)  # (N,)
@@ -202,8 +205,13 @@ def _place(held: Held, targets: Targets, rows: Index, numbers: Index, expected: 
         box = seen.boxes[place]
         part = intersections(box[None], inside.boxes)[0] / max(float(areas(box[None])[0]), 1e-6)
         owner = int(np.argmax(part))
-        if part[owner] >= _PIECE and _is_piece(sight.bodies, box, seen.boxes[holder[owner]]):
-            row = int(rows[owner])
+        row = int(rows[owner])
+        torn = sight.frame.time - targets.whole[row] >= _TORN
+        if part[owner] < _PIECE:
+            continue
+        if not _is_piece(sight.bodies, box, seen.boxes[holder[owner]], torn):
+            held.parted.add(row)
+        else:
             held.pieces[row] = (*held.pieces.get(row, ()), int(numbers[place]))
 
 
@@ -225,10 +233,14 @@ def _moved_inside(boxes: Boxes, limits: Float) -> Boxes:
     return np.asarray(boxes + np.tile(np.clip(0.0, np.minimum(one, other), np.maximum(one, other)), 2), np.float32)
 
 
-def _is_piece(bodies: Bodies, region: Float, main: Float) -> bool:
-    """Whether a region is a piece of the target that has the main one, not a body by itself."""
+def _is_piece(bodies: Bodies, region: Float, main: Float, torn: bool) -> bool:
+    """Whether a region is a piece of the target that has the main one, not a body by itself.
+
+    Where bodies are not known yet, what has been `torn` for long into two of a size is two.
+    """
     if not bodies.known:
-        return True
+        small, large = sorted(areas(np.stack([region, main])).tolist())
+        return not torn or small < _TWINS * large
     whole, one, other = bodies.strangeness(np.stack([hull(np.stack([region, main])), main, region]))
     return bool(whole <= (one + other) / 2)
 

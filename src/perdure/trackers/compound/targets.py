@@ -43,6 +43,7 @@ class Targets:
     born: NDArray[np.float64]  # (N,) s, first seen
     seen: NDArray[np.float64]  # (N,) s, last seen by itself
     shared: NDArray[np.float64]  # (N,) s, when it last shared a region
+    whole: NDArray[np.float64]  # (N,) s, when it was last one region, or none
     missed: NDArray[np.float64]  # (N,) s for which it might have been seen since, and was not
     partly: NDArray[np.float64]  # (N,) s for which a side has been hidden
     hits: NDArray[np.int64]  # (N,) regions it had for itself
@@ -119,6 +120,7 @@ def newborn(frame: Frame, boxes: Boxes, scores: Float, classes: NDArray[np.str_]
         born=now,
         seen=now,
         shared=np.full(count, -np.inf),
+        whole=now,
         missed=np.zeros(count),
         partly=np.zeros(count),
         hits=np.ones(count, np.int64),

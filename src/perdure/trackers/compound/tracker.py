@@ -18,6 +18,7 @@ from perdure.scene.reach import within_reach
 from perdure.scene.zones import Zones, counting, renumbered
 from perdure.trackers.compound.bodies import Bodies
 from perdure.trackers.compound.companies import Pair, accompany
+from perdure.trackers.compound.darting import darted
 from perdure.trackers.compound.gathering import HIDDEN, Held, Sight, gather
 from perdure.trackers.compound.identity import Judge
 from perdure.trackers.compound.matrix import Possible, Thresholds, match
@@ -258,6 +259,7 @@ class Compound:
             _PART,
             *(_BLOBS if blobs else _BOXES),
         )
+        possible = None if blobs else self._possible(state, expected, active, frame, regions)
         found = match(
             regions.boxes,
             regions.scores,
@@ -265,9 +267,14 @@ class Compound:
             targets.temporary[active],
             cost[active].astype(np.float32),
             limits,
-            None if blobs else self._possible(state, expected, active, frame, regions),
+            possible,
             place_of(state.zones, targets, active, expected, frame, regions),
         )
+        sure = regions.scores >= self.sure_score
+        eager = (targets.ids > 0) & (targets.missed == 0) & ~targets.temporary & ~targets.frozen
+        if state.zones.has("occlusion"):  # she may have gone behind it
+            eager &= state.zones.behind(targets.boxes, expected) < 0
+        found = darted(found, regions.boxes, sure, expected[active], eager[active], possible, state.size)
         fresh = (targets.ids == 0) & (frame.time - targets.born < self.confirm)
         near = self.apart if blobs else -1.0
         sight = Sight(frame, regions, state.size, state.bodies, near, self.colour > 0)

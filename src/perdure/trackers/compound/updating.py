@@ -73,6 +73,12 @@ def update(
         whole = np.maximum(sizes(boxes), 1.0)
         targets = targets.with_(temporary, points=generic_points(boxes), size=whole, seen=time)
         targets = extended(targets, temporary, time, centres(boxes), whole)
+    torn = np.isin(np.arange(len(targets)), list(held.pieces))
+    targets = targets.replace(whole=np.where(torn, targets.whole, time))
+    parted = np.array(sorted(held.parted), np.intp)
+    if len(parted):  # no longer as large as all were
+        boxes = regions.boxes[region[parted]]
+        targets = targets.with_(parted, points=generic_points(boxes), size=sizes(boxes), hidden=0, partly=0.0)
     return targets
 
 
@@ -157,7 +163,7 @@ def learn(
     alone = (
         (region >= 0) & ~targets.temporary & (targets.compound == 0) & (targets.ids > 0) & (targets.hidden == 0)
     )
-    alone &= inside
+    alone &= inside & (targets.whole >= targets.seen)  # in one piece
     return learnt(bodies, boxes[alone], max(seconds, 0.0), memory) if alone.any() else bodies
 
 
