@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import os
+import sys
 
 from hypothesis import settings
 
@@ -9,6 +10,11 @@ from hypothesis import settings
 # that tests start; not OPENBLAS_NUM_THREADS, which would win over what such a test says.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
+
+# Bytecode is kept, whatever the shell says: or every process that a test starts compiles all that it imports anew, and
+# pytest every test, which is a tenth of the time of the suite.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # The first call of a kernel compiles it; how long that takes is no property of the code under test.
 settings.register_profile("perdure", deadline=None, derandomize=True)
