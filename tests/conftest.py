@@ -2,7 +2,9 @@
 
 import os
 import sys
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
 
 # A process for each core runs tests; more threads would only turn in circles for a core that is taken. What must hold
@@ -19,3 +21,11 @@ sys.dont_write_bytecode = False
 # The first call of a kernel compiles it; how long that takes is no property of the code under test.
 settings.register_profile("perdure", deadline=None, derandomize=True)
 settings.load_profile("perdure")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_power_cut() -> Iterator[None]:
+    """What is written need not be on the disk before a test goes on: others read it without."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(os, "fsync", lambda _: None)
+        yield

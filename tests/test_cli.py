@@ -240,7 +240,7 @@ def test_parameters_of_a_file_count_and_those_of_the_command_line_win(place: Pat
 
 
 def test_what_detect_wrote_tracks_like_the_video_itself(place: Path):
-    done = perdure_alone("detect", "walk.avi", "-o", "seen.jsonl", "--json", at=place)
+    done = perdure("detect", "walk.avi", "-o", "seen.jsonl", "--json", at=place)
     assert json.loads(done.stdout)["frames"] == 40
     perdure("track", "walk.avi", "-o", "recorded", "--no-video", "--detector", "seen.jsonl", at=place)
     for name in ("tracks.jsonl", "tracks.txt", "events.csv"):
@@ -263,7 +263,7 @@ def test_a_motchallenge_folder_without_images_needs_no_detector_named(place: Pat
 
 
 def test_draw_makes_the_film_again(place: Path):
-    done = perdure_alone("draw", "walk.avi", "first", "-o", "film.webm", at=place)
+    done = perdure("draw", "walk.avi", "first", "-o", "film.webm", at=place)
     assert done.returncode == 0, done.stderr
     with av.open(str(place / "film.webm")) as film:
         assert sum(1 for _ in film.decode(video=0)) == 40
@@ -271,7 +271,7 @@ def test_draw_makes_the_film_again(place: Path):
 
 
 def test_export_writes_what_counts_as_mot_and_csv(place: Path):
-    assert perdure_alone("export", "first", "--format", "mot", "-o", "out.txt", at=place).returncode == 0
+    assert perdure("export", "first", "--format", "mot", "-o", "out.txt", at=place).returncode == 0
     assert (place / "out.txt").read_bytes() == (place / "first/tracks.txt").read_bytes()
     perdure("export", "first", "--format", "csv", "-o", "out.csv", at=place)
     rows = list(csv.DictReader((place / "out.csv").read_text().splitlines()))
@@ -282,7 +282,7 @@ def test_export_writes_what_counts_as_mot_and_csv(place: Path):
 def test_a_truncated_video_is_tracked_up_to_its_damage_and_says_so(place: Path):
     data = (place / "walk.avi").read_bytes()
     (place / "cut.avi").write_bytes(data[: len(data) * 3 // 4])
-    done = perdure_alone("track", "cut.avi", "-o", "cut", "--json", at=place)
+    done = perdure("track", "cut.avi", "-o", "cut", "--json", at=place)
     assert done.returncode == 3, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["status"] == "damaged"
@@ -293,7 +293,7 @@ def test_a_truncated_video_is_tracked_up_to_its_damage_and_says_so(place: Path):
 
 
 def test_ctrl_c_ends_cleanly_with_everything_so_far_kept(tmp_path: Path):
-    images = [frame.image.repeat(4, axis=0).repeat(4, axis=1) for frame in two_apart().frames()] * 40
+    images = [frame.image.repeat(4, axis=0).repeat(4, axis=1) for frame in two_apart().frames()] * 20
     write_film(tmp_path / "long.avi", images)
     running = subprocess.Popen(
         [*PERDURE, "track", "long.avi", "-o", "run"], cwd=tmp_path, stderr=subprocess.PIPE, text=True
@@ -350,7 +350,7 @@ def test_draw_over_a_damaged_film_says_so(place: Path):
 
 
 def test_a_usage_mistake_is_one_line_with_meaning_and_range(place: Path):
-    done = perdure_alone("track", "walk.avi", "-o", "x", "--patience", "long", at=place)
+    done = perdure("track", "walk.avi", "-o", "x", "--patience", "long", at=place)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert "0 to 3600 s" in done.stderr
@@ -430,9 +430,10 @@ def test_a_stream_is_tracked_and_drawn_while_it_comes(place: Path):
     assert (missing.returncode, "404" in missing.stderr, (place / "y").exists()) == (2, True, False)
 
 
-def test_help_tells_meaning_range_and_default_of_every_parameter():
-    wide = {**os.environ, "COLUMNS": "200", "TERM": "dumb"}
-    done = subprocess.run([*PERDURE, "track", "--help"], capture_output=True, text=True, env=wide)
+def test_help_tells_meaning_range_and_default_of_every_parameter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("TERM", "dumb")
+    done = perdure("track", "--help", at=tmp_path)
     assert "--patience" in done.stdout
     assert "0 to 3600 s; default 1" in done.stdout
     assert "Detector background" in done.stdout

@@ -1,4 +1,4 @@
-"""Run one tracker over a drawn world into a folder: `one_run.py TRACKER FOLDER THREADS`."""
+"""Run every tracker over a drawn world, each into a folder of its name: `one_run.py FOLDER THREADS`."""
 
 import sys
 from pathlib import Path
@@ -11,10 +11,12 @@ from worlds import crossing
 from perdure import pipeline
 from perdure.cli.running import run
 from perdure.files.runs import Reporting, RunFolder
+from perdure.trackers import TRACKERS
 
 if __name__ == "__main__":
-    tracker, folder, threads = sys.argv[1:]
+    folder, threads = sys.argv[1:]
     cv2.setNumThreads(int(threads))
     world = crossing()
-    plan = pipeline.plan([frame.image for frame in world.frames()], tracker=tracker, fps=world.fps)
-    run(plan, RunFolder.create(Path(folder), overwrite=False), Reporting(), film=False)
+    for tracker in TRACKERS:
+        plan = pipeline.plan([frame.image for frame in world.frames()], tracker=tracker, fps=world.fps)
+        run(plan, RunFolder.create(Path(folder) / tracker, overwrite=False), Reporting(), film=False)

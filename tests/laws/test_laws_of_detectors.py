@@ -191,9 +191,10 @@ def test_a_mirrored_film_gives_mirrored_regions(kind):
 def test_the_state_stays_bounded_on_an_endless_film(kind):
     world = lone_walker()
     detector = detector_for(kind, world)
-    state, _ = run(detector, world.frames(), world.scene)
+    frames = world.frames()
+    state, _ = run(detector, frames, world.scene)
     early = len(states.save(state))
-    later = [Frame(40 + k, (40 + k) / 10, world.frames()[k % 40].image) for k in range(160)]
+    later = [Frame(40 + k, (40 + k) / 10, frames[k % 40].image) for k in range(160)]
     state, _ = run(detector, later, world.scene, state)
     assert len(states.save(state)) <= early + 64
 

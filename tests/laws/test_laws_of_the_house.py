@@ -152,19 +152,23 @@ def test_every_parameter_says_what_it_means():
             assert one.range_text or one.kind in (bool, str)  # what words may be said is in the help
 
 
-@pytest.mark.parametrize("tracker", TRACKERS)
-def test_the_same_input_gives_the_same_bytes_in_any_process_with_any_number_of_threads(tmp_path: Path, tracker):
-    program = Path(__file__).parent / "one_run.py"
-    digests = set()
+@pytest.fixture(scope="module")
+def in_two_processes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Every tracker over one film in a process with one thread, and in another with two."""
+    program, place = Path(__file__).parent / "one_run.py", tmp_path_factory.mktemp("threads")
     for threads, seed in (("1", "1"), ("2", "77")):
         settings = {"OMP_NUM_THREADS": threads, "NUMBA_NUM_THREADS": threads, "PYTHONHASHSEED": seed}
-        folder = tmp_path / threads
-        subprocess.run(
-            [sys.executable, str(program), tracker, str(folder), threads],
-            env={**os.environ, **settings},
-            check=True,
-        )
-        contents = b"".join((folder / name).read_bytes() for name in ("tracks.jsonl", "tracks.txt", "events.csv"))
+        words = [sys.executable, str(program), str(place / threads), threads]
+        subprocess.run(words, env={**os.environ, **settings}, check=True)
+    return place / "1", place / "2"
+
+
+@pytest.mark.parametrize("tracker", TRACKERS)
+def test_the_same_input_gives_the_same_bytes_in_any_process_with_any_number_of_threads(in_two_processes, tracker):
+    digests = set()
+    for place in in_two_processes:
+        names = ("tracks.jsonl", "tracks.txt", "events.csv")
+        contents = b"".join((place / tracker / name).read_bytes() for name in names)
         assert len(contents) > 2000
         digests.add(hashlib.sha256(contents).hexdigest())
     assert len(digests) == 1

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sklearn.metrics import roc_auc_score
 
 from perdure.maths.boost import (
     LARGEST,
@@ -159,6 +158,8 @@ def test_no_samples_give_no_rounds():
 
 
 def test_separation_is_the_area_under_the_curve():
+    from sklearn.metrics import roc_auc_score
+
     rng = np.random.default_rng(3)
     labels = np.where(rng.random(60) < 0.3, 1, -1)
     similarities = np.round(np.clip(rng.normal(0.5 + 0.1 * labels, 0.2), 0, 1), 1)[:, None]  # with ties

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import norm
-from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
 from perdure.maths.discriminant import Moments, log_odds
 
@@ -49,6 +47,8 @@ def test_what_is_older_counts_less():
 
 
 def test_kinds_are_parted_as_linear_discriminant_analysis_does():
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+
     same, other = samples()
     one, two = learnt(same), learnt(other)
     analysis = LinearDiscriminantAnalysis(solver="lsqr").fit(
@@ -64,6 +64,8 @@ def test_kinds_are_parted_as_linear_discriminant_analysis_does():
 
 
 def test_log_odds_between_two_means_are_those_of_normal_densities_and_none_is_more_than_six():
+    from scipy.stats import norm
+
     one, two = (Moments.assumed([mean], [0.1], 0.0, 50.0) for mean in (0.8, 0.6))
     deviation = np.sqrt(0.1**2 + 1e-4)
     between = np.linspace(0.61, 0.79, 7)

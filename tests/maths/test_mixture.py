@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sklearn.mixture import GaussianMixture
 
 from perdure.errors import ParameterError
 from perdure.maths.kernels.mixtures import (
@@ -33,7 +32,9 @@ def drawn(mixture: Mixture, rng: np.random.Generator, count: int) -> np.ndarray:
     return mixture.means[which] + (np.linalg.cholesky(mixture.covariances)[which] @ noise)[..., 0]
 
 
-def in_sklearn(mixture: Mixture, **options) -> GaussianMixture:
+def in_sklearn(mixture: Mixture, **options):
+    from sklearn.mixture import GaussianMixture
+
     return GaussianMixture(
         len(mixture),
         weights_init=mixture.weights,
@@ -125,6 +126,8 @@ def test_after_as_many_steps_from_the_same_start_scikit_learn_is_as_far(iteratio
 
 
 def test_from_nothing_it_finds_as_likely_a_mixture_as_scikit_learn():
+    from sklearn.mixture import GaussianMixture
+
     rng = np.random.default_rng(3)
     truth = some_mixture(rng, 5, 3)
     points = drawn(truth, rng, 3000)

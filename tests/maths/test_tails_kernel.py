@@ -3,7 +3,6 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from perdure.maths.kernels.tails import student_ratios, student_ratios_twin
 
@@ -21,6 +20,8 @@ def test_student_ratios_are_those_of_the_twin(seed, height, width):
 
 
 def test_the_ratio_is_that_of_scipy_up_to_the_scale_of_its_spread():
+    from scipy import stats
+
     # (1 + d² / 2) ** -1.5 is the Student of the plane with one degree of freedom, d measured in 1 / sqrt(2)
     vectors = np.random.default_rng(0).normal(0, 3, (5, 7, 2)).astype(np.float32)
     middle, spread = np.float32([2, -1]), np.float32([0.5, 1.5])

@@ -113,6 +113,8 @@ class Format:
         The only classes that it has words for; empty where any will do.
     unnamed : str
         What it says of a row without a class, where that does not read back as none.
+    blank : str
+        What it writes for a blank in a class, where it cannot hold one.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Format:
     rounds: Mapping[str, float] = field(default_factory=dict)
     classes: tuple[str, ...] = ()
     unnamed: str = ""
+    blank: str = " "
 
 
 class Gathering:

@@ -2,14 +2,14 @@
 
 `frame id type truncated occluded alpha left top right bottom height width length x y z rotation_y [score]`, by the
 development kit of the benchmark (Geiger, Lenz & Urtasun, CVPR 2012). What is not known of a row is written as the kit
-wants it of results: truncated -1, alpha -10, dimensions -1, location -1000, rotation -10.
+wants it of results: truncated -1, alpha -10, dimensions -1, location -1000, rotation -10. Words of a class are joined
+by `_`, as in its own `Person_sitting`.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from perdure.errors import OutputError
 from perdure.files.formats.content import Content, Format, Gathering, Reading, counted_from_one
 from perdure.files.formats.traits import Trait
 from perdure.files.lines import short
@@ -75,17 +75,13 @@ def _add(rows: Gathering, place: str, words: list[str]) -> None:
 
 
 def write(path: Path, content: Content, *, overwrite: bool) -> int:
-    """Write a label file, with scores where any is not 1; OutputError for a class with a blank in it."""
+    """Write a label file, with scores where any is not 1; a class of several words is joined by `_`."""
     refuse_existing(path, overwrite=overwrite)
     tracks = content.tracks
     scored = bool((tracks.confidence != 1).any())
     with whole_file(path) as file:
         for k in range(len(tracks)):
-            kind = str(tracks.classes[k]) or FORMAT.unnamed
-            if len(kind.split()) != 1:
-                raise OutputError(
-                    f"class {kind!r} has a blank, which a KITTI label cannot hold; give another by --class"
-                )
+            kind = "_".join(str(tracks.classes[k]).split()) or FORMAT.unnamed
             box = " ".join(f"{short(side):.12g}" for side in tracks.boxes[k])
             occluded = _OCCLUDED[Status(tracks.status[k])]
             score = f" {short(tracks.confidence[k]):.12g}" if scored else ""
@@ -105,4 +101,5 @@ FORMAT = Format(
         {Trait.BOX, Trait.CLASS, Trait.CHANGING_CLASS, Trait.CONFIDENCE, Trait.CHANGING_CONFIDENCE, Trait.STATUS}
     ),
     unnamed="Misc",
+    blank="_",
 )

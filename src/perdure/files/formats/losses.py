@@ -48,6 +48,9 @@ def _lost_words(tracks: Tracks, format_: Format) -> list[Loss]:
     if format_.classes:
         others = int(np.count_nonzero(~np.isin(tracks.classes, ("", *format_.classes))))
         found += [Loss(f"classes other than {' and '.join(format_.classes)}", others)] if others else []
+    if format_.blank != " ":
+        apart = sum(len(str(one).split()) > 1 for one in tracks.classes)
+        found += [Loss(f"blanks in classes: they are {format_.blank!r} there", apart)] if apart else []
     none = int(np.count_nonzero(tracks.classes == ""))
     if none and format_.unnamed:
         found.append(
