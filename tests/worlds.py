@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -44,10 +45,7 @@ class World:
 
     def seen(self) -> list[tuple[Frame, Regions]]:
         """The frames with what a perfect background subtraction sees: blocks that touch are one region."""
-        return [
-            (frame, components(np.uint8(255) * (frame.image != 90).any(axis=2), least_area=4))
-            for frame in self.frames()
-        ]
+        return list(_seen(self))
 
     def truth(self) -> Tracks:
         rows = [
@@ -75,6 +73,15 @@ class World:
                 x1, y1, x2, y2 = (max(0, side) for side in self._box(block, k))
                 picture[y1:y2, x1:x2] = block.colour
         return picture
+
+
+@functools.lru_cache(maxsize=8)
+def _seen(world: World) -> tuple[tuple[Frame, Regions], ...]:
+    """Frames and regions are never changed (a law of its own), so that several tests may have them."""
+    return tuple(
+        (frame, components(np.uint8(255) * (frame.image != 90).any(axis=2), least_area=4))
+        for frame in world.frames()
+    )
 
 
 def walk(start: tuple[int, int], step: tuple[int, int], begin: int = 0, end: int = 10**6) -> Path:
