@@ -163,6 +163,19 @@ def test_a_class_of_several_words_becomes_one_word_in_kitti_and_that_is_told(
     assert (again.code, again.stderr, Path("b.txt").read_text()) == (0, "", Path("a.txt").read_text())
 
 
+def test_a_size_in_which_the_boxes_do_not_lie_is_a_note_that_names_one(
+    perdure_says: Callable[..., Done], boxes: Path
+):
+    there = perdure_says("convert", "boxes.txt", "a.json", "--to", "coco-video", "--size", "640x480")
+    assert (there.code, there.stderr) == (
+        0,
+        "perdure: note: 1 of 3 boxes lie more outside than inside the 640x480 of --size, "
+        "the first that of id 1 in frame 0 (911.48, 483.1, 1009.03, 592.16)\n",
+    )
+    wide = perdure_says("convert", "boxes.txt", "b.json", "--to", "coco-video", "--size", "1920x1080")
+    assert (wide.code, wide.stderr) == (0, "")  # a box may leave the picture a little
+
+
 REFUSED = [
     (("boxes.txt", "a.json"), "a.json may be of several formats; name one by --to: coco-vis, coco-video"),
     (("boxes.txt", "a.xyz"), "a.xyz does not tell its format; name one by --to: mot, mots"),

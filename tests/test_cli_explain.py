@@ -114,6 +114,14 @@ def test_without_a_frame_the_most_doubtful_links_come_first_and_all_of_them_in_o
     assert len(said("explain", run, "--id", 1, "--most", 4)[1].splitlines()) == 11
 
 
+def test_a_frame_may_be_written_as_for_start_and_end(run: Path):
+    plain = said("explain", run, "--id", 1, "--frame", 12)
+    assert said("explain", run, "--id", 1, "--frame", "12f") == plain
+    for wrong in ("12.5", "-1", "f", "1:02", "9" * 30):
+        code, _, why = said("explain", run, "--id", 1, f"--frame={wrong}")
+        assert (code, "is no number of a frame; write '10' or '10f'" in why) == (1, True)
+
+
 def test_a_row_that_was_filled_in_says_between_which_frames(run: Path):
     text = said("explain", run, "--id", 1, "--frame", 19)[1]
     assert "filled in between frames 17 and 21" in text

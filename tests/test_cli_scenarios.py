@@ -53,6 +53,21 @@ def own(tmp_path: Path) -> Path:
     return tmp_path / "own.toml"
 
 
+def test_a_line_outside_the_picture_is_a_note(yard: Path, tmp_path: Path):
+    lines = "[line]\ndoor = [[600, 10], [900, 50]]\ngate = [[0, 0], [640, 240]]\n"
+    (tmp_path / "far.toml").write_text(lines + OWN)
+    run, note = (
+        tmp_path / "run",
+        "perdure: note: line door: its point 900,50 lies outside the picture of 640x240\n",
+    )
+    words = ("--scenarios", tmp_path / "far.toml")
+    code, _, wrong = said("track", yard, "--tracker", "overlap", "--no-video", "-o", run, *words)
+    assert (code, note in wrong, "line gate" in wrong) == (0, True, False)
+    assert note.split(": ", 2)[2].strip() in json.loads((run / "run.json").read_text())["warnings"]
+    code, _, wrong = said("scenarios", run, *words)
+    assert (code, wrong.endswith(note)) == (0, True)
+
+
 def test_events_of_scenarios_are_in_the_run_and_noise_is_taken_back(yard: Path, own: Path, tmp_path: Path):
     run = tmp_path / "run"
     words = ("track", yard, "--tracker", "overlap", "--no-video", "-o", run)

@@ -125,7 +125,12 @@ class Plan:
 
     def notes(self) -> tuple[str, ...]:
         """Return what the user should know about how source, detections and tracker went together."""
-        return (*self._of_marks(), *self._of_detections(), *self._of_ground(), *self._of_contexts())
+        parts = self._of_marks, self._of_detections, self._of_ground, self._of_contexts, self.of_lines
+        return tuple(note for part in parts for note in part())
+
+    def of_lines(self) -> tuple[str, ...]:
+        """Return what the user should know of the lines in his scenarios."""
+        return () if self.rules is None else self.rules.outside(self.scene.width, self.scene.height)
 
     def _of_ground(self) -> tuple[str, ...]:
         """What the user should know of the ground that was to be estimated."""

@@ -15,6 +15,7 @@ from perdure.cli import options
 from perdure.cli.tables import aligned
 from perdure.errors import ParameterError
 from perdure.files.runs import RunFolder
+from perdure.files.span import frame_of
 from perdure.reasons import Reason, Told, as_value, most_doubtful, told
 from perdure.types import Event, Status
 
@@ -35,12 +36,12 @@ def explain(
             show_default=False,
         ),
     ] = None,
-    frame: Annotated[
-        Optional[int],  # noqa: UP045
+    row: Annotated[
+        Optional[str],  # noqa: UP045
         typer.Option(
             "--frame",
             metavar="N",
-            help="Which row, by the source's own number of the frame, from 0; without it the most doubtful links.",
+            help="Which row, by the source's own number of the frame, from 0 (12 or 12f); without it the most doubtful links.",
             show_default=False,
         ),
     ] = None,
@@ -54,6 +55,7 @@ def explain(
     json_: options.JsonOption = False,
 ) -> None:
     """Show why a target has its id: by frame the features' similarities, weights, the score, and who came next."""
+    frame = None if row is None else frame_of(row, "frame")
     if frame is not None and all_:
         raise ParameterError("--all shows every frame and --frame one; leave out one of them")
     if most is not None and (all_ or frame is not None):

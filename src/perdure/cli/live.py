@@ -145,6 +145,8 @@ def live(
         with _served(health, vital) as url, Ending() as ending:
             print(f"perdure: following {opened.origin} into {place}{url}; Ctrl-C ends it", file=sys.stderr)
             opened.told = _say
+            for note in made.of_lines():
+                _say(f"note: {note}")
             warmed(made)
             told = _told(events is not None, hook, opened)
             frames = ending.frames(_limited(opened, limit))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
+import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -56,8 +57,10 @@ def scenarios(
     folder = RunFolder.open(run)
     about = folder.read_about()
     width, height = _size(about, folder)
-    known = _zones(about, zones, width, height)
-    interpreter = Interpreter.of(Scene(width, height, zones=known.zones, rules=known.rules), read_rules(scenarios))
+    known, wanted = _zones(about, zones, width, height), read_rules(scenarios)
+    for note in wanted.outside(width, height):
+        print(f"perdure: note: {note}", file=sys.stderr)
+    interpreter = Interpreter.of(Scene(width, height, zones=known.zones, rules=known.rules), wanted)
     rows, _, _ = folder.read(with_masks=False)
     frames = {entry.frame: entry.time for entry in folder.entries(with_masks=False) if entry.frame >= 0}
     told = over_run(interpreter, rows, list(frames), list(frames.values()))

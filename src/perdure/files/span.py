@@ -87,6 +87,23 @@ def read_span(start: str | float | None, end: str | float | None, stride: int) -
     return span
 
 
+def frame_of(given: str, name: str) -> int:
+    """Return the number of a frame, from 0, as a user writes it: '10', or '10f' as for `--start`.
+
+    Raises
+    ------
+    ParameterError
+        For what is no such number.
+
+    >>> frame_of("10", "frame"), frame_of("10f", "frame")
+    (10, 10)
+    """
+    digits = given.strip().removesuffix("f")
+    if not re.fullmatch(r"[0-9]+", digits) or _whole(digits) > _LONGEST:
+        raise ParameterError(f"{name} = {shown(given)} is no number of a frame; write '10' or '10f', from 0")
+    return int(digits)
+
+
 def no_frame(span: Span) -> str:
     """Say that no frame lies in a span, and what would do."""
     if span.start is None and span.end is not None:

@@ -13,6 +13,7 @@ from perdure.files.formats.known import FORMATS, read, recognised
 from perdure.files.formats.losses import Loss, lost
 from perdure.files.formats.traits import Trait
 from perdure.files.images import natural_order
+from perdure.types import Tracks
 
 
 @dataclass(frozen=True)
@@ -67,13 +68,28 @@ def gathered(path: Path, format_: Format | None, wishes: Wishes) -> tuple[Conten
         if content.size not in (None, wishes.size):
             (height, width), (high, wide) = content.size or wishes.size, wishes.size
             raise ParameterError(f"{path} says {width}x{height}, --size says {wide}x{high}; leave --size out")
-        content = content.replace(size=wishes.size)
+        content = content.replace(size=wishes.size, notes=(*content.notes, *_outside(content.tracks, wishes.size)))
     if wishes.kind:
         tracks = content.tracks
         content = content.replace(
             tracks=tracks.replace(classes=np.where(tracks.classes == "", wishes.kind, tracks.classes))
         )
     return content, source
+
+
+def _outside(tracks: Tracks, size: tuple[int, int]) -> tuple[str, ...]:
+    """A note where boxes have their middle outside a picture (height, width): one may leave it, but not many."""
+    boxes, (height, width) = tracks.boxes.astype(np.float64), size
+    x, y = (boxes[:, 0] + boxes[:, 2]) / 2, (boxes[:, 1] + boxes[:, 3]) / 2
+    out = np.flatnonzero((x < 0) | (x > width) | (y < 0) | (y > height))
+    if not len(out):
+        return ()
+    first = out[0]
+    sides = ", ".join(f"{side:g}" for side in boxes[first])
+    return (
+        f"{len(out)} of {len(boxes)} boxes lie more outside than inside the {width}x{height} of --size, the first "
+        f"that of id {tracks.ids[first]} in frame {tracks.frames[first]} ({sides})",
+    )
 
 
 def write(path: Path, content: Content, source: str, target: Format, *, overwrite: bool) -> Written:

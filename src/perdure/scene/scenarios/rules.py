@@ -180,6 +180,18 @@ class Rules:
                 if line not in (ANY, *names):
                     raise ParameterError(f"{one.name}: {unknown_name('line', line, names)}")
 
+    def outside(self, width: int, height: int) -> tuple[str, ...]:
+        """Return in words what points of lines lie outside a picture of so many pixels, one of each line."""
+        told = []
+        for line in self.lines:
+            out = [(x, y) for x, y in line.points if not (0 <= x <= width and 0 <= y <= height)]
+            if out:
+                x, y = out[0]
+                told.append(
+                    f"line {line.name}: its point {x:g},{y:g} lies outside the picture of {width}x{height}"
+                )
+        return tuple(told)
+
     def check_zones(self, zones: tuple[str, ...]) -> None:
         """Refuse zones that a place has not.
 
