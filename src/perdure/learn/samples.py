@@ -1,38 +1,22 @@
-"""Learn how things are told apart in a kind of scene: films with a truth in, a context out (section 3, eq. 11-14).
-
-A sample is a pair of seen things, an earlier one and a later one: +1 if they are one object, -1 if not. Of each pair
-every feature of the pool tells how alike the two are, and boosting weighs the features by how well they tell the kinds
-of pairs apart (`perdure.maths.boost`).
-
-The paper takes all pairs of consecutive frames, and one threshold for all features (`PAPER`). Where we depart, each by
-a parameter: pairs also farther apart, as a tracker has them after a gap; only pairs that are near enough to be linked,
-or else what is trivially different would swamp the rest; the earlier thing carried on by its own motion; a threshold
-that each round chooses; both kinds of pairs weighing the same; similarities counted between the levels that are
-usual for different and for same pairs.
-"""
+"""Films with their truths in, pairs of seen things out, each with how alike it is in every feature (section 3)."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure import params
-from perdure.errors import ParameterError
-from perdure.features import pool
 from perdure.features.boxes import overlaps
 from perdure.features.feature import Feature, Memory
 from perdure.features.pool import POOL
 from perdure.features.pool import known as known_rows
+from perdure.learn.learning import Learning
 from perdure.maths.assign import assign
-from perdure.maths.boost import Boosted, best_thresholds, boost_at, boost_stumps, errors_at, separation
-from perdure.params import parameter
-from perdure.scene.context import ON_GROUND, Alone, Context, Training
 from perdure.scene.measuring import Measures, Measuring, measure, measures_of
 from perdure.scene.measuring import start as start_measuring
 from perdure.types import Frame, Regions, Rows, Scene, Use
@@ -41,44 +25,7 @@ Float = NDArray[np.float64]
 Bits = NDArray[np.bool_]
 NEAR = "displacement_2d"  # the feature that gates pairs
 LEAST_OVERLAP = 0.5  # of a detection with the truth that it is
-SPREAD = (0.05, 0.95)  # quantiles: levels are that of different pairs and that of same ones
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-
-
-@dataclass(frozen=True)
-class Learning:
-    """How a context is learnt."""
-
-    rounds: int = parameter(30, "rounds of boosting at most", low=1, high=10_000, symbol="Z")
-    similar: float = parameter(
-        0.0, "least similarity of what counts as the same, for all features; 0: learnt", low=0.0, high=1.0,
-        symbol="Th1",
-    )  # fmt: skip
-    kept: float = parameter(
-        0.98, "share of the same pairs that a learnt threshold lets be linked", low=0.5, high=1.0
-    )
-    gap: float = parameter(
-        2.0, "how far apart two things of a pair may be seen; 0: in consecutive frames", unit="s", low=0.0,
-        high=60.0, symbol="T2",
-    )  # fmt: skip
-    gated: bool = parameter(True, "only pairs that are near enough in the picture to be linked")
-    carried: float = parameter(
-        1.0, "for how long back a motion is fitted that carries on the earlier thing; 0: it stays", unit="s",
-        low=0.0, high=60.0,
-    )  # fmt: skip
-    balanced: bool = parameter(True, "same and different pairs weigh the same on the whole")
-    levels: bool = parameter(True, "similarities count between those usual for different and for same pairs")
-    least_weight: float = parameter(
-        0.05, "a feature that would weigh less is left out, and need not be computed", low=0.0, high=0.5
-    )
-    least_score: float = parameter(0.0, "detections of a lower score are left out", low=0.0, high=1.0)
-    ours: bool = parameter(True, "features beyond the paper's eight may be chosen too")
-    most: int = parameter(100_000, "pairs that are kept, half of them same ones", low=100, high=10_000_000)
-
-
-PAPER = Learning(
-    similar=0.5, gap=0.0, gated=False, carried=0.0, balanced=False, levels=False, least_weight=0.0, ours=False
-)
 
 
 class Film(NamedTuple):
@@ -106,159 +53,6 @@ class Samples:
         return np.asarray(self.labels > 0)
 
 
-class Learnt(NamedTuple):
-    """A context, the samples that it was learnt from, and the rounds."""
-
-    context: Context
-    samples: Samples
-    boosted: Boosted
-
-
-def learn(films: Iterable[Film], learning: Learning | None = None, name: str = "learnt") -> Learnt:
-    """Learn a context from films with their truths.
-
-    Raises
-    ------
-    ParameterError
-        If there is no pair of one object in all of them: nothing can be learnt.
-    """
-    learning = Learning() if learning is None else learning
-    params.check(learning)
-    drawn = _Drawn((_Kept.none(),) * 2)
-    sources, measured = [], []
-    for film in films:
-        drawn, measures = _watch(film, learning, drawn)
-        sources.append(film.name)
-        measured.append(measures)
-    samples = drawn.samples()
-    _refuse_nothing(samples, sources)
-    found = context_of(samples, learning, name)
-    told = replace(found.context.training, sources=tuple(sources))
-    context = replace(found.context, measures=_mean(measured), training=told)
-    return found._replace(context=context)
-
-
-def context_of(samples: Samples, learning: Learning, name: str) -> Learnt:
-    """Learn a context from samples, of which some are of the same object."""
-    boosted, notes = _boosted(samples, learning)
-    names = tuple(POOL)
-    heavy = boosted.weights >= min(max(learning.least_weight, 1e-12), float(boosted.weights.max()))
-    rest = np.where(heavy, boosted.weights, 0.0) / boosted.weights[heavy].sum()
-    weights = {one: float(weight) for one, weight in zip(names, rest, strict=True) if weight > 0}
-    levels = _levels(samples, weights) if learning.levels else {}
-    context = Context(name, weights, levels=levels)
-    link, told = link_similarity(context, samples)
-    similar = learning.similar
-    if not similar:
-        same = link[samples.same & told]
-        similar = float(np.quantile(same, 1.0 - learning.kept)) if len(same) else 0.0
-    training = Training(
-        same=round(float(samples.weights[samples.same].sum())),
-        different=round(float(samples.weights[~samples.same].sum())),
-        separation=float(separation(link[:, None], told[:, None], samples.labels)[0]),
-        notes=notes,
-        options=params.values(learning),
-        alone=_alone(samples, learning, boosted),
-    )
-    return Learnt(replace(context, similar=similar, training=training), samples, boosted)
-
-
-def link_similarity(context: Context, samples: Samples) -> tuple[Float, Bits]:
-    """Return LS (N,) of samples (eq. 10), over the features known of each, and where any is (N,)."""
-    total, share = np.zeros(len(samples.labels)), np.zeros(len(samples.labels))
-    for k, name in enumerate(POOL):
-        weight = context.weights.get(name, 0.0)
-        if weight > 0:
-            there = samples.known[:, k]
-            total += weight * np.where(there, context.levelled(name, samples.similarities[:, k]), 0.0)
-            share += weight * there
-    return np.divide(total, share, out=np.zeros_like(total), where=share > 0), np.asarray(share > 0)
-
-
-# Boosting ---------------------------------------------------------------------------------------------------
-
-
-def _initial(samples: Samples, learning: Learning) -> Float:
-    """What each sample weighs at first (N,): as the films have them, or both kinds the same."""
-    if not learning.balanced or samples.same.all():
-        return samples.weights
-    shares = np.where(samples.same, samples.weights[samples.same].sum(), samples.weights[~samples.same].sum())
-    return np.asarray(samples.weights / shares)
-
-
-def _boosted(samples: Samples, learning: Learning) -> tuple[Boosted, tuple[str, ...]]:
-    """The rounds and weights; displacement alone where there is nothing to tell apart, and a note why."""
-    if samples.same.all():
-        return _by_displacement(samples), ("nothing else is near the objects: displacement alone",)
-    allowed = np.array([learning.ours or name in pool.PAPER for name in POOL])
-    known = samples.known & allowed
-    given = samples.similarities, known, samples.labels, _initial(samples, learning), learning.rounds
-    found = boost_at(learning.similar, *given) if learning.similar else boost_stumps(*given)
-    if not found.rounds:
-        return _by_displacement(samples), ("no feature tells the pairs apart: displacement alone",)
-    return found, ()
-
-
-def _by_displacement(samples: Samples) -> Boosted:
-    """All weight on displacement: on the ground if that is known of half the pairs at least, else in the picture."""
-    names = tuple(POOL)
-    on_ground = samples.known[:, names.index(ON_GROUND)].mean() >= 0.5
-    weights = np.zeros(len(names))
-    weights[names.index(ON_GROUND if on_ground else NEAR)] = 1.0
-    return Boosted((), weights)
-
-
-def _levels(samples: Samples, weights: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """What is usual for different pairs and for same ones, of features that weigh anything and where it rises."""
-    found = {}
-    for k, name in enumerate(POOL):
-        of_kind = [samples.similarities[samples.known[:, k] & kind, k] for kind in (~samples.same, samples.same)]
-        if name in weights and all(len(one) for one in of_kind):
-            low, high = (float(np.quantile(one, share)) for one, share in zip(of_kind, SPREAD, strict=True))
-            if high - low > 1e-3:
-                found[name] = (low, high)
-    return found
-
-
-def _alone(samples: Samples, learning: Learning, boosted: Boosted) -> dict[str, Alone]:
-    """What each feature tells by itself, of those that are known of any pair."""
-    given = samples.similarities, samples.known, samples.labels, _initial(samples, learning)
-    if learning.similar:
-        thresholds, errors = np.full(len(POOL), learning.similar), errors_at(learning.similar, *given)
-    else:
-        thresholds, errors = best_thresholds(*given)
-    areas, shares = separation(*given[:3]), samples.known.mean(axis=0)
-    chosen = np.bincount([one.feature for one in boosted.rounds], minlength=len(POOL))
-    return {
-        name: Alone(float(areas[k]), float(thresholds[k]), float(errors[k]), int(chosen[k]), float(shares[k]))
-        for k, name in enumerate(POOL)
-        if shares[k] > 0
-    }
-
-
-def _refuse_nothing(samples: Samples, sources: list[str]) -> None:
-    if not samples.same.any():
-        where = ", ".join(sources) or "no film"
-        what = "no object is seen twice" if not len(samples.labels) else "no two things seen are the same object"
-        raise ParameterError(
-            f"nothing can be learnt from {where}: {what} near where it was; check that the truth and the detections "
-            "are of this film, its frames and its size"
-        )
-
-
-def _mean(measured: list[Measures]) -> Measures:
-    """What the films are like on the mean."""
-    values: dict[str, float | bool | None] = {}
-    for name in ("objects", "cover", "occlusion", "depth", "illumination", "contrast", "fps"):
-        there = [value for one in measured if (value := getattr(one, name)) is not None]
-        values[name] = sum(there) / len(there) if there else None
-    flags = {name: all(getattr(one, name) for one in measured) for name in ("pictures", "ground")}
-    return Measures(**values, **flags)  # type: ignore[arg-type]
-
-
-# Samples ----------------------------------------------------------------------------------------------------
-
-
 class _Kept(NamedTuple):
     """Pairs of one kind, thinned to a share whenever they become too many."""
 
@@ -284,13 +78,18 @@ class _Kept(NamedTuple):
         return _Kept(blocks, all_lots, self.seen + seen, rate)
 
 
-class _Drawn(NamedTuple):
+class Drawn(NamedTuple):
     """The pairs drawn so far, different and same."""
 
     kinds: tuple[_Kept, ...]
 
+    @staticmethod
+    def none() -> Drawn:
+        """Return no pairs yet."""
+        return Drawn((_Kept.none(),) * 2)
+
     def samples(self) -> Samples:
-        """All of them in columns."""
+        """Return all of them in columns."""
         empty = np.zeros((0, len(POOL)))
         rows = [np.concatenate([empty, *kind.similarities]) for kind in self.kinds]  # (N, K) each
         labels = [np.full(len(one), label, np.int8) for one, label in zip(rows, (-1, 1), strict=True)]
@@ -309,8 +108,8 @@ class _Seen(NamedTuple):
     speeds: Mapping[str, Float]  # of those that move (N, 2), a second
 
 
-def _watch(film: Film, learning: Learning, drawn: _Drawn) -> tuple[_Drawn, Measures]:
-    """Draw pairs from a film, and measure it."""
+def watch(film: Film, learning: Learning, drawn: Drawn) -> tuple[Drawn, Measures]:
+    """Draw pairs from a film, beside those drawn so far, and measure it."""
     features = {name: make(film.scene) for name, make in POOL.items()}
     memories = {name: feature.start(film.scene) for name, feature in features.items()}
     trails = _Trails.none()
@@ -383,7 +182,7 @@ def _earlier(window: deque[_Seen], number: int, learning: Learning) -> Iterator[
         yield window[-min(max(back, 2), len(window))]
 
 
-def _pairs(then: _Seen, now: _Seen, features: Mapping[str, Feature], learning: Learning, drawn: _Drawn) -> _Drawn:
+def _pairs(then: _Seen, now: _Seen, features: Mapping[str, Feature], learning: Learning, drawn: Drawn) -> Drawn:
     """Draw the pairs of two frames: of an object and of two; of two false detections nobody knows."""
     told = (then.ids[:, None] > 0) | (now.ids > 0)
     one, other = np.nonzero(told)  # (P,)
@@ -401,7 +200,7 @@ def _pairs(then: _Seen, now: _Seen, features: Mapping[str, Feature], learning: L
         columns = [_similarities(name, feature, *given) for name, feature in features.items()]
         found = np.stack(columns, axis=1)  # (P, K)
         kinds.append(kind.with_pairs(found, lots[lots < kind.rate], len(lots), learning.most // 2))
-    return _Drawn(tuple(kinds))
+    return Drawn(tuple(kinds))
 
 
 def _similarities(
