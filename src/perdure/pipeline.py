@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import inspect
 import math
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perdure import equipment, fold, params
-from perdure.detect import DETECTORS, Mark, Marked, WithMarks
+from perdure.detect import Mark, Marked, WithMarks
 from perdure.detect.plausible import left_out
-from perdure.detection import AnyDetector, check_classes, detector_name, kinds_of, made_detector, recorded
+from perdure.detection import AnyDetector, check_classes, detector_name, made_detector, recorded
 from perdure.equipment import AnyContext, equipped
 from perdure.errors import DamagedVideo, ParameterError
 from perdure.files.calibration import read_calibration
@@ -31,6 +32,7 @@ from perdure.files.video import Source, open_source
 from perdure.files.zones import read_zones
 from perdure.foreign import AnySettings, made_foreign
 from perdure.interpret import Feedback, Interpreter, Placing
+from perdure.owners import of_scenarios, split
 from perdure.scene.perspective import BODY, Estimate, estimate
 from perdure.scene.scenarios import Rules
 from perdure.scene.zones import Zones
@@ -314,7 +316,7 @@ def plan(
         if detector is None and not words and not opened.has_images:
             detector, name = _own_detections(opened), "recorded"
         rules = scenarios if isinstance(scenarios, Rules) or scenarios is None else read_rules(scenarios)
-        of_feedback, others = _of_feedback(parameters or {}, rules)
+        of_feedback, others = of_scenarios(parameters or {}, rules)
         of_tracker, of_detector = split(others, tracker, name, box_masks)
         made_tracker = params.build(TRACKERS[tracker], of_tracker) if foreign is None else foreign
         made_tracker = equipped(made_tracker, tracker, context, embedding)
@@ -467,90 +469,12 @@ def _refuse_late_start(source: Source, start: str | float | None) -> None:
         )
 
 
-class Split(NamedTuple):
-    """Named values divided between tracker and detector."""
-
-    tracker: dict[str, object]
-    detector: dict[str, object]
-
-
-def split(given: Mapping[str, object], tracker: str, detector: str, box_masks: str | None = None) -> Split:
-    """Divide named values between tracker and detector, and the background model that makes silhouettes of its boxes.
-
-    Raises
-    ------
-    ParameterError
-        For a name that neither has, with who has it or the nearest one.
-    """
-    ours = [TRACKERS[tracker]] if tracker in TRACKERS else []
-    owners = {
-        one.name: part
-        for part, kinds in (("tracker", ours), ("detector", kinds_of(detector, box_masks)))
-        for kind in kinds
-        for one in params.describe(kind)
-    }
-    if not isinstance(given, Mapping):
-        raise ParameterError(f"parameters must be values by name, such as {{'patience': 2.0}}, not {given!r:.60}")
-    divided = Split({}, {})
-    for name, value in given.items():
-        if name not in owners:
-            raise ParameterError(_stranger(name, owners, tracker, detector))
-        getattr(divided, owners[name])[name] = value
-    return divided
-
-
-def _of_feedback(
-    given: Mapping[str, object], rules: Rules | None
-) -> tuple[dict[str, object], Mapping[str, object]]:
-    """Values of `Feedback` among those that were given, and the others."""
-    if not isinstance(given, Mapping):
-        return {}, given
-    known = {one.name for one in params.describe(Feedback)}
-    own = {name: value for name, value in given.items() if name in known}
-    if own and rules is None:
-        raise ParameterError(f"{next(iter(own))!r} goes with --scenarios; name a file of them, or 'usual'")
-    return own, {name: value for name, value in given.items() if name not in known}
-
-
-def _stranger(name: str, owners: Mapping[str, str], tracker: str, detector: str) -> str:
-    for what, kinds in (("tracker", TRACKERS), ("detector", DETECTORS)):
-        for other, kind in kinds.items():
-            if name in {one.name for one in params.describe(kind)}:
-                return f"{name!r} belongs to the {what} {other!r}, which this run does not use"
-    return params.unknown_name(f"parameter of the tracker {tracker!r} or the detector {detector!r}", name, owners)
-
-
 def _sorted_options(options: Mapping[str, Any]) -> dict[str, Any]:
     """Keep the options of `plan`; all else are parameters by name."""
-    own = {key: value for key, value in options.items() if key in _OPTIONS}
-    others = {key: value for key, value in options.items() if key not in _OPTIONS}
+    known = set(inspect.signature(plan).parameters) - {"source"}
+    own = {key: value for key, value in options.items() if key in known}
+    others = {key: value for key, value in options.items() if key not in known}
     return {**own, "parameters": {**(own.get("parameters") or {}), **others}}
-
-
-_OPTIONS = frozenset(
-    (
-        "tracker",
-        "tracker_settings",
-        "tracker_environment",
-        "detector",
-        "box_masks",
-        "class_names",
-        "init",
-        "fps",
-        "start",
-        "end",
-        "stride",
-        "roi",
-        "zones",
-        "calibration",
-        "object_height",
-        "classes",
-        "context",
-        "embedding",
-        "scenarios",
-        "parameters",
-    )
-)
 
 
 def _own_detections(source: Source) -> Path:
