@@ -12,28 +12,24 @@ from pathlib import Path
 
 import pytest
 
-from perdure.cli import main
 from perdure.cli.progress import COMPILING, watched
 from perdure.maths.kernels import ahead, kept
 
 PERDURE = [sys.executable, "-c", "from perdure.cli import main; main()"]
 
 
-def test_warmup_makes_every_kernel_ready_and_says_where_they_are_kept(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    words = [*PERDURE, "warmup", "--json"]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
-    told = json.loads(done.stdout.splitlines()[-1])
+def warmup(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*PERDURE, "warmup", *words], capture_output=True, text=True, timeout=120)
+
+
+def test_warmup_makes_every_kernel_ready_and_says_where_they_are_kept():
+    told = json.loads(warmup("--json").stdout.splitlines()[-1])
     assert {one["name"] for one in told["kernels"]} == set(ahead.declared())
     (place,) = told["places"]
     assert any(Path(place).glob("gaussian.*.kernel"))
-    monkeypatch.setattr(sys, "argv", ["perdure", "warmup"])
-    with pytest.raises(SystemExit):
-        main()
-    again = capsys.readouterr().out
-    assert f"all {len(told['kernels'])} kernels were there already" in again
-    assert place in again
+    again = warmup()
+    assert f"all {len(told['kernels'])} kernels were there already" in again.stdout
+    assert place in again.stdout
 
 
 TWO = """

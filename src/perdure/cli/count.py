@@ -26,9 +26,7 @@ from perdure.types import Tracks
 
 @options.with_parameters(("", {"What counts": Reporting}))
 def count(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
-    ],
+    run: options.RunArgument,
     chosen: dict[str, object],
     line: Annotated[
         Optional[list[str]],  # noqa: UP045 - typer reads this at run time
@@ -81,12 +79,7 @@ def count(
             show_default=False,
         ),
     ] = None,
-    class_: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--class", metavar="NAME", help="Only targets of this class; may be repeated.", show_default=False
-        ),
-    ] = None,
+    class_: options.TargetClassOption = None,
     overwrite: options.OverwriteOption = False,
     json_: options.JsonOption = False,
 ) -> None:
@@ -128,14 +121,19 @@ def count(
         **summary(counts, on_ground=on_ground),
     }
     if output is not None:
-        from perdure.draw.counts import plot
-
-        with whole_files(output, NAMES, overwrite=overwrite) as part:
-            write_counts(part, counts, told, plot(counts), on_ground=on_ground)
+        _write(output, counts, told, on_ground=on_ground, overwrite=overwrite)
         told["output"] = str(output)
     print(_words(told, output))
     if json_:
         print(json.dumps(told))
+
+
+def _write(output: Path, counts: Counts, told: dict[str, Any], *, on_ground: bool, overwrite: bool) -> None:
+    """Write the tables and the picture into a folder, all or nothing."""
+    from perdure.draw.counts import plot
+
+    with whole_files(output, NAMES, overwrite=overwrite) as part:
+        write_counts(part, counts, told, plot(counts), on_ground=on_ground)
 
 
 def summary(counts: Counts, *, on_ground: bool) -> dict[str, Any]:

@@ -22,9 +22,7 @@ from perdure.pipeline import zoned
 
 def draw(
     source: options.SourceArgument,
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
-    ],
+    run: options.RunArgument,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="The film: .mp4 or .webm.", show_default=False)
     ],

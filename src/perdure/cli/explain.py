@@ -24,9 +24,7 @@ MOST = 10  # links that are shown where nobody says how many
 
 
 def explain(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
-    ],
+    run: options.RunArgument,
     identity: Annotated[
         Optional[int],  # noqa: UP045 - typer reads this at run time
         typer.Option(

@@ -43,9 +43,7 @@ OF_BOXES = ("csv", "mot", "cvat", "kitti")
 
 @options.with_parameters(("", {"What counts": Reporting}))
 def export(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
-    ],
+    run: options.RunArgument,
     output: Annotated[
         Path,
         typer.Option(

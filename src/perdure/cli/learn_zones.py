@@ -28,9 +28,7 @@ _LONGEST_SIDE = 1 << 16  # px
 
 
 def learn(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
-    ],
+    run: options.RunArgument,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="The zones, .json.", show_default=False)
     ],

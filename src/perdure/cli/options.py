@@ -25,6 +25,9 @@ SourceArgument = Annotated[
         show_default=False,
     ),
 ]
+RunArgument = Annotated[
+    Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
+]
 FpsOption = Annotated[
     Optional[float],  # noqa: UP045 - typer reads this at run time
     typer.Option("--fps", help="Frames per second, where the source has none or a wrong one.", show_default=False),
@@ -115,6 +118,12 @@ ClassOption = Annotated[
     Optional[list[str]],  # noqa: UP045
     typer.Option(
         "--class", metavar="NAME", help="Only regions of this class; may be repeated.", show_default=False
+    ),
+]
+TargetClassOption = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--class", metavar="NAME", help="Only targets of this class; may be repeated.", show_default=False
     ),
 ]
 ParametersOption = Annotated[

@@ -29,9 +29,7 @@ _SHOWN = 40  # events that are printed
 
 
 def scenarios(
-    run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A run folder of `perdure track`.", show_default=False)
-    ],
+    run: options.RunArgument,
     scenarios: Annotated[
         str,
         typer.Option(
