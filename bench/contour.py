@@ -38,13 +38,12 @@ from unittest import mock
 
 import cv2
 import numpy as np
-from pages import Marks, versions
-from regions import Table, chosen, markdown, plain
+from pages import Marks, given, versions
+from regions import Table, chosen, markdown
 
 from perdure.errors import ParameterError, PerdureError
 from perdure.files.mask_pngs import read_indices
 from perdure.files.video import open_source
-from perdure.files.whole import whole_file
 from perdure.maths import levelset, lie
 from perdure.trackers.contour import Contour, births, looking, measuring, observer, tracker, updating
 from perdure.types import Bits, Frame, Mask, Regions, Scene
@@ -65,13 +64,7 @@ def main() -> None:
     arguments = _arguments()
     try:
         result = measure(arguments.parts, arguments.rounds, arguments.data)
-        print("\n\n".join(plain(one) for one in result.tables))
-        if arguments.write:
-            text = PAGE.read_text(encoding="utf-8")
-            with whole_file(PAGE) as file:
-                file.write(MARKS.replaced(text, section("python bench/contour.py --write", result, text)))
-        if arguments.json:
-            print(json.dumps(result.told))
+        given(result, arguments, PAGE, MARKS, section)
     except PerdureError as error:
         print(f"contour.py: {error}", file=sys.stderr)
         raise SystemExit(2) from None

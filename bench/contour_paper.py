@@ -41,14 +41,13 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pages import Marks, absent, versions
-from regions import Table, chosen, markdown, plain
+from pages import Marks, absent, given, versions
+from regions import Table, chosen, markdown
 
 from perdure import fold
 from perdure.errors import ParameterError, PerdureError
 from perdure.files.mots import read_masks
 from perdure.files.video import open_source
-from perdure.files.whole import whole_file
 from perdure.maths import levelset, lie
 from perdure.pipeline import plan
 from perdure.trackers.contour import Contour, observer
@@ -68,13 +67,7 @@ def main() -> None:
     arguments = _arguments()
     try:
         result = measure(arguments)
-        print("\n\n".join(plain(one) for one in result.tables))
-        if arguments.write:
-            text = PAGE.read_text(encoding="utf-8")
-            with whole_file(PAGE) as file:
-                file.write(MARKS.replaced(text, section("python bench/contour_paper.py --write", result, text)))
-        if arguments.json:
-            print(json.dumps(result.told))
+        given(result, arguments, PAGE, MARKS, section)
     except PerdureError as error:
         print(f"contour_paper.py: {error}", file=sys.stderr)
         raise SystemExit(2) from None

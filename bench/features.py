@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import importlib
-import json
 import statistics
 import sys
 import time
@@ -34,13 +33,12 @@ from unittest import mock
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pages import Marks, versions
-from regions import Table, chosen, markdown, plain
+from pages import Marks, given, versions
+from regions import Table, chosen, markdown
 
 from perdure.errors import ParameterError, PerdureError
 from perdure.features.feature import Feature, Float
 from perdure.features.pool import PAPER, POOL
-from perdure.files.whole import whole_file
 from perdure.scene.ground import Ground
 from perdure.trackers.multifeature import MultiFeature
 from perdure.types import Frame, Regions, Scene
@@ -65,13 +63,7 @@ def main() -> None:
     try:
         cv2.setNumThreads(1)
         result = measure(arguments.parts, arguments.frames)
-        print("\n\n".join(plain(one) for one in result.tables))
-        if arguments.write:
-            text = PAGE.read_text(encoding="utf-8")
-            with whole_file(PAGE) as file:
-                file.write(MARKS.replaced(text, section("python bench/features.py --write", result, text)))
-        if arguments.json:
-            print(json.dumps(result.told))
+        given(result, arguments, PAGE, MARKS, section)
     except PerdureError as error:
         print(f"features.py: {error}", file=sys.stderr)
         raise SystemExit(2) from None

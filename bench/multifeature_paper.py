@@ -33,7 +33,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import os
 import statistics
 import sys
@@ -46,15 +45,14 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import peers
-from pages import Marks, absent, versions
-from regions import Table, chosen, markdown, plain
+from pages import Marks, absent, given, versions
+from regions import Table, chosen, markdown
 
 from perdure import fold
 from perdure.errors import PerdureError
 from perdure.features.pool import PAPER as EIGHT
 from perdure.features.pool import POOL
 from perdure.files.mot import read_truth
-from perdure.files.whole import whole_file
 from perdure.learn import PAPER, Film, Learning, Samples, context_of, learn, link_similarity
 from perdure.metrics import score
 from perdure.pipeline import plan
@@ -76,15 +74,7 @@ def main() -> None:
     try:
         cv2.setNumThreads(1)
         result = measure(arguments)
-        print("\n\n".join(plain(one) for one in result.tables))
-        if arguments.write:
-            text = PAGE.read_text(encoding="utf-8")
-            with whole_file(PAGE) as file:
-                file.write(
-                    MARKS.replaced(text, section("python bench/multifeature_paper.py --write", result, text))
-                )
-        if arguments.json:
-            print(json.dumps(result.told))
+        given(result, arguments, PAGE, MARKS, section)
     except (PerdureError, peers.PeersError) as error:
         print(f"multifeature_paper.py: {error}", file=sys.stderr)
         raise SystemExit(2) from None

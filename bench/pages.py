@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
 import itertools
+import json
 import platform
 import sys
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
+from regions import plain
 
 from perdure.errors import ParameterError
+from perdure.files.whole import whole_file
 
 
 class Marks(NamedTuple):
@@ -25,6 +30,11 @@ class Marks(NamedTuple):
     def of(script: str, page: Path) -> Marks:
         """Return those of a script, which is named as `bench/NAME.py`."""
         return Marks(f"<!-- {script} begins -->", f"<!-- {script} ends -->", page.name)
+
+    @property
+    def script(self) -> str:
+        """As `bench/NAME.py`."""
+        return self.begin.split()[1]
 
     def replaced(self, page: str, inside: str) -> str:
         """Return a page with what is between the marks replaced; ParameterError where they are not there."""
@@ -42,6 +52,19 @@ class Marks(NamedTuple):
             for title, table in itertools.pairwise(blocks)
             if title.startswith("**")
         ]
+
+
+def given(
+    result: Any, arguments: argparse.Namespace, page: Path, marks: Marks, section: Callable[..., str]
+) -> None:
+    """Print the tables of a result; with `--write` put its section into a page, with `--json` print what it told."""
+    print("\n\n".join(plain(one) for one in result.tables))
+    if arguments.write:
+        text = page.read_text(encoding="utf-8")
+        with whole_file(page) as file:
+            file.write(marks.replaced(text, section(f"python {marks.script} --write", result, text)))
+    if arguments.json:
+        print(json.dumps(result.told))
 
 
 def versions() -> dict[str, str]:

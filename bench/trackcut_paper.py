@@ -40,7 +40,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
-import json
 import os
 import sys
 import time
@@ -55,8 +54,8 @@ from unittest import mock
 import cv2
 import numpy as np
 from cut_domain import Compared, compared, domain_table
-from pages import Marks, absent, versions
-from regions import Table, chosen, markdown, plain
+from pages import Marks, absent, given, versions
+from regions import Table, chosen, markdown
 
 from perdure import fold
 from perdure.detect import Background
@@ -66,7 +65,6 @@ from perdure.features.masks import mask_overlaps
 from perdure.files.mot import read_truth
 from perdure.files.mots import read_masks
 from perdure.files.video import open_source
-from perdure.files.whole import whole_file
 from perdure.maths import flow
 from perdure.metrics import score
 from perdure.pipeline import FIRST_LOOKS, AnySource, plan
@@ -86,13 +84,7 @@ def main() -> None:
     arguments = _arguments()
     try:
         result = measure(arguments)
-        print("\n\n".join(plain(one) for one in result.tables))
-        if arguments.write:
-            text = PAGE.read_text(encoding="utf-8")
-            with whole_file(PAGE) as file:
-                file.write(MARKS.replaced(text, section("python bench/trackcut_paper.py --write", result, text)))
-        if arguments.json:
-            print(json.dumps(result.told))
+        given(result, arguments, PAGE, MARKS, section)
     except PerdureError as error:
         print(f"trackcut_paper.py: {error}", file=sys.stderr)
         raise SystemExit(2) from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contour as bench
 import numpy as np
 import pytest
+from regions import plain as as_text
 
 from perdure.errors import ParameterError
 from perdure.types import Frame, Scene
@@ -18,7 +19,7 @@ def test_a_walk_times_updates_and_waves_make_the_contour_longer(monkeypatch):
     assert wavy.length > plain.length
     assert plain.clock > 0
     assert plain.rate == pytest.approx(1e3 / plain.clock)
-    assert "30x50" in bench.plain(bench.updates_table([plain]))
+    assert "30x50" in as_text(bench.updates_table([plain]))
 
 
 def test_a_slope_is_the_power_by_which_time_grows():
@@ -48,7 +49,7 @@ def test_every_stage_of_a_step_is_timed(monkeypatch):
     assert (found.frames, found.objects) == (3, 1)
     assert all(found.stages[stage] > 0 for stage in bench.STAGES)
     assert sum(found.stages.values()) == pytest.approx(found.whole)
-    assert "step / pass" in bench.plain(bench.stages_table([found]))
+    assert "step / pass" in as_text(bench.stages_table([found]))
 
 
 def test_tables_of_other_parts_stay_on_the_page_and_its_marks_are_needed(tmp_path, capsys):
