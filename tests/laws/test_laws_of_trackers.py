@@ -31,7 +31,7 @@ def run(tracker, seen, scene) -> list[Report]:
     return [*reports, tracker.finish(state)]
 
 
-_ON = 12  # frames after which a resumed run is compared with the one that went on
+_ON = 5  # frames after which a resumed run is compared with the one that went on
 
 
 class Whole(NamedTuple):
