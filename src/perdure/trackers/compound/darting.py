@@ -10,12 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from perdure.features.boxes import centres, intersections, sizes
+from perdure.features.boxes import centres, intersections, overlaps, sizes
 from perdure.maths.assign import assign
 from perdure.trackers.compound.matrix import Matched, Possible
 from perdure.types import Boxes
 
 _REACH = 2.0  # lengths of a body, that it may lie off where it was expected
+_TOUCHING = 0.15  # overlap with where it was expected, from which it was refused for a reason
 _UNLIKE = 2.0  # ratio of lengths, from which it is another
 
 
@@ -59,7 +60,8 @@ def darted(
     long, other = sizes(targets[gone]).max(axis=1)[:, None], sizes(regions[new]).max(axis=1)
     way = centres(targets[gone])[:, None] - centres(regions[new])
     far = np.hypot(way[..., 0], way[..., 1]) / np.maximum(np.maximum(long, other), 1.0)  # (G, N)
-    can = (far < _REACH) & (long < _UNLIKE * other) & (other < _UNLIKE * long)
+    can = (far < _REACH) & (overlaps(targets[gone], regions[new]) < _TOUCHING)
+    can &= (long < _UNLIKE * other) & (other < _UNLIKE * long)
     if possible is not None:
         row, column = np.nonzero(can)
         can[row, column] = possible(new[column], gone[row])
