@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from perdure.errors import FormatError
 from perdure.files.log import RunLog, read_log
 from perdure.types import Dropped, Event, Explanation, Ground, Mask, Outline, Renamed, Report, Status, Tracks
+from perdure.web.ledger import Ledger
 
 FULL = Report(
     rows=Tracks.of(
@@ -63,6 +65,84 @@ def test_a_damaged_line_in_the_middle_is_named(tmp_path: Path):
     (tmp_path / "bad").write_text(lines[0] + "{nonsense}\n" + lines[1])
     with pytest.raises(FormatError, match="line 2"):
         list(read_log(tmp_path / "bad"))
+
+
+SAID = {"id": 1, "box": [0, 0, 9, 9], "status": "visible", "confidence": 1}
+EVENT = {"kind": "merge", "begin": 0, "end": 0, "ids": [1], "zone": "", "confidence": 1, "why": ""}
+IMPOSSIBLE = [
+    {"frame": "0"},
+    {"frame": 0.5},
+    {"frame": True},
+    {"frame": -2},
+    {"frame": 0},
+    {"frame": 2, "time": -1e400},
+    {"time": "1"},
+    {"time": 1e400},
+    {"rows": [SAID | {"id": 0}]},
+    {"rows": [SAID | {"id": "1"}]},
+    {"rows": [SAID | {"id": 1.5}]},
+    {"rows": [SAID | {"id": 2**63}]},
+    {"rows": [SAID | {"frame": -1}]},
+    {"rows": [SAID | {"box": [0, 0, 9]}]},
+    {"rows": [SAID | {"box": [9, 0, 0, 9]}]},
+    {"rows": [SAID | {"box": [0, 0, "9", 9]}]},
+    {"rows": [SAID | {"box": [0, 0, 1e300, 9]}]},
+    {"rows": [SAID | {"status": "seen"}]},
+    {"rows": [SAID | {"confidence": None}]},
+    {"rows": [SAID | {"class": 7}]},
+    {"rows": [SAID | {"group": -7}]},
+    {"rows": [SAID | {"inferred": "no"}]},
+    {"rows": [SAID | {"links": "12"}]},
+    {"rows": [SAID | {"ground": [1]}]},
+    {"renamed": [[1, "2", 0, 0]]},
+    {"renamed": [[1, 2**70, 0, 0]]},
+    {"dropped": [[1, 0]]},
+    {"events": [EVENT | {"ids": "12"}]},
+    {"events": [EVENT | {"confidence": "sure"}]},
+    {"events": [EVENT | {"begin": 2, "end": 1}]},
+    {"begun": [EVENT | {"begin": None}]},
+    {"explanations": [{"id": 1, "why": 2, "figures": {}}]},
+    {"explanations": [{"id": 1, "why": "near", "figures": {"distance": "2"}}]},
+]
+
+
+@pytest.mark.parametrize("wrong", IMPOSSIBLE, ids=str)
+def test_a_report_of_which_anything_cannot_be_is_named_and_the_viewer_says_so_too(tmp_path: Path, wrong: dict):
+    path = written(tmp_path / "log")
+    good = {"frame": 1, "time": 0, "rows": [SAID]}
+    wrong = {"frame": 2} | wrong
+    path.write_text(path.read_text() + json.dumps(good) + "\n" + json.dumps(good | wrong) + "\n")
+    with pytest.raises(FormatError, match="line 3: not") as told:
+        list(read_log(path))
+    assert "\n" not in str(told.value)
+    ledger = Ledger(path)
+    ledger.refresh()
+    assert "line 3: not" in ledger.damage
+    assert len(ledger.columns().ids) == 1
+
+
+def test_numbers_that_json_has_not_are_refused_in_a_log(tmp_path: Path):
+    path = written(tmp_path / "log")
+    path.write_text(path.read_text() + '{"frame":0,"time":NaN,"rows":[]}\n')
+    with pytest.raises(FormatError, match=r"line 2: not JSON .NaN is not a number that JSON has"):
+        list(read_log(path))
+
+
+def test_a_row_of_this_frame_and_another_time_keeps_it(tmp_path: Path):
+    rows = Tracks.of(frames=[3], times=[0.25], ids=[1], boxes=[[0, 0, 9, 9]])
+    (entry,) = read_log(written(tmp_path / "log", Report(rows)))
+    assert entry.report.rows.times.tolist() == [0.25]
+
+
+def test_a_few_bytes_cannot_unfold_into_all_of_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("perdure.files.room._LEAST", 1000)
+    monkeypatch.setattr("perdure.files.room._EACH", 1)
+    path = written(tmp_path / "log")
+    mask = {"x": 0, "y": 0, "size": [30, 30], "runs": [900]}
+    line = {"frame": 0, "time": 0, "rows": [SAID | {"mask": mask, "believed": mask} for _ in range(2)]}
+    path.write_text(path.read_text() + json.dumps(line) + "\n")
+    with pytest.raises(FormatError, match=r"line 2: .*unfold into more pixels"):
+        list(read_log(path))
 
 
 @pytest.mark.parametrize(

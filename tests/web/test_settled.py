@@ -27,7 +27,7 @@ def tangled(seed: int, frames: int = 25) -> list[Report]:
             frames=when,
             times=when / 10,
             ids=rng.integers(1, 7, count),
-            boxes=rng.integers(0, 50, (count, 4)),
+            boxes=np.sort(rng.integers(0, 50, (count, 2, 2)), axis=1).reshape(count, 4),
             status=rng.integers(0, 5, count),
             confidence=rng.integers(0, 5, count) / 4,
             groups=np.where(rng.random(count) < 0.3, rng.integers(1, 9, count), 0),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,14 @@ from perdure.types.frame import of_run_lengths, run_lengths
 Json = Any
 _LONGEST_SIDE, _LARGEST_AREA = 1 << 15, 1 << 28  # px, of a silhouette
 _FAR = 10**6  # px
+
+
+class NotANumber(ValueError):
+    """NaN or an infinity, which JSON has not."""
+
+
+class HalfALetter(ValueError):
+    """One half of a surrogate pair, which is no letter."""
 
 
 class Line(NamedTuple):
@@ -132,14 +141,41 @@ def _are_whole(values: Json) -> bool:
     return isinstance(values, list) and set(map(type, values)) <= {int}
 
 
+def number_of(word: str) -> float:
+    """Return the number that a word says; ValueError for what is none, also where Python would pass over `_`."""
+    if "_" in word or not word.isascii():
+        raise ValueError("not a number")
+    return float(word)
+
+
 def short(value: np.float32 | float) -> float:
     """Return the shortest number that reads back as the same float32."""
     return float(str(np.float32(value)))
 
 
+def four_digits(value: np.float32 | float) -> str:
+    """Return a confidence of four digits, and with four decimals where another program counts beyond 1.
+
+    >>> four_digits(0.123456), four_digits(1.0), four_digits(98.7654)
+    ('0.1235', '1', '98.7654')
+    """
+    number = float(value)
+    return f"{number:.4g}" if abs(number) <= 1 else f"{number:.4f}".rstrip("0").rstrip(".")
+
+
 def short_row(values: NDArray[np.float32]) -> list[float]:
     """Return a row of float32 as the shortest numbers."""
     return [short(value) for value in values]
+
+
+def json_of(text: str | bytes) -> Json:
+    """Return the value of a text; ValueError or RecursionError where it is not JSON, also for NaN and infinities."""
+    return _whole_letters(text, json.loads(text, parse_constant=_no_number))
+
+
+def json_with_nan(text: str | bytes) -> Json:
+    """Return the value of a text as `json_of` does, with NaN and infinities, for who says himself which number it is."""
+    return _whole_letters(text, json.loads(text))
 
 
 def why_not_json(error: ValueError | RecursionError) -> str:
@@ -148,14 +184,35 @@ def why_not_json(error: ValueError | RecursionError) -> str:
         return error.msg
     if isinstance(error, UnicodeDecodeError):
         return "it is not text"
+    if isinstance(error, HalfALetter):
+        return str(error)
+    if isinstance(error, NotANumber):
+        return f"{error} is not a number that JSON has; give null or leave it out"
     return "it is nested too deep" if isinstance(error, RecursionError) else "a number in it has too many digits"
 
 
 def _parse(path: Path, number: int, raw: bytes) -> Mapping[str, Json]:
     try:
-        value = json.loads(raw)
+        value = json_of(raw)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}, line {number}: not JSON ({why_not_json(error)})") from error
     if not isinstance(value, Mapping):
         raise FormatError(f"{path}, line {number}: not a JSON object")
     return value
+
+
+def _whole_letters(text: str | bytes, value: Json) -> Json:
+    """A text's value; HalfALetter where a text in it cannot be written again, as escapes can say."""
+    if (_HALF if isinstance(text, str) else _HALF_BYTES).search(text):  # type: ignore[arg-type]
+        try:
+            json.dumps(value, ensure_ascii=False).encode("utf-8")
+        except UnicodeEncodeError:
+            raise HalfALetter("half of a surrogate pair stands alone") from None
+    return value
+
+
+_HALF, _HALF_BYTES = re.compile(r"\\u[dD][89a-fA-F]"), re.compile(rb"\\u[dD][89a-fA-F]")
+
+
+def _no_number(word: str) -> NoReturn:
+    raise NotANumber(word)

@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 from zlib import crc32
 
-import numpy as np
-
 from perdure.errors import FormatError, OutputError
-from perdure.files.lines import (
-    mask_of_json,
-    mask_to_json,
-    outline_of_json,
-    outline_to_json,
-    read_lines,
-    short,
-    short_row,
-    to_line,
-)
+from perdure.files.lines import read_lines, to_line
+from perdure.files.reports import check_report, report_of_json, report_to_json
 from perdure.files.whole import cannot_write, lock
-from perdure.types import Dropped, Event, Explanation, Ground, Mask, Renamed, Report, Status, Tracks
+from perdure.types import Report
 
 FORMAT, VERSION = "perdure-log", 1
 Json = Any
@@ -141,91 +130,12 @@ def read_log(path: Path, *, with_masks: bool = True) -> Iterator[Entry]:
     FormatError
         Naming file and line, if the log is damaged elsewhere than at its cut-off end.
     """
+    newest = -1
     for number, _, value in read_lines(path, FORMAT, VERSION):
         try:
-            entry = Entry(int(value["frame"]), float(value["time"]), report_of_json(value, with_masks))
+            frame, time = check_report(value, newest)
+            entry = Entry(frame, time, report_of_json(value, with_masks))
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise FormatError(f"{path}, line {number}: not a report ({error})") from error
+        newest = max(newest, frame)
         yield entry
-
-
-def report_to_json(frame: int, time: float, report: Report) -> Json:
-    """Return a report as plain values; columns at their default are left out."""
-    value: dict[str, Json] = {"frame": frame, "time": time}
-    value["rows"] = [_row_to_json(report.rows, i, frame) for i in range(len(report.rows))]
-    if report.renamed:
-        value["renamed"] = [[one.old, one.new, one.begin, one.end] for one in report.renamed]
-    if report.dropped:
-        value["dropped"] = [[one.id, one.begin, one.end] for one in report.dropped]
-    if report.events:
-        value["events"] = [dataclasses.asdict(one) for one in report.events]
-    if report.begun:
-        value["begun"] = [dataclasses.asdict(one) for one in report.begun]
-    if report.explanations:
-        value["explanations"] = [
-            {"id": one.id, "why": one.why, "figures": dict(one.figures)} for one in report.explanations
-        ]
-    return value
-
-
-def report_of_json(value: Mapping[str, Json], with_masks: bool = True) -> Report:
-    """Return the report that `report_to_json` wrote."""
-    frame, time = int(value["frame"]), float(value["time"])
-    return Report(
-        rows=_rows_of_json(value["rows"], frame, time, with_masks),
-        renamed=tuple(Renamed(*map(int, one)) for one in value.get("renamed", ())),
-        dropped=tuple(Dropped(*map(int, one)) for one in value.get("dropped", ())),
-        events=_events_of_json(value.get("events", ())),
-        begun=_events_of_json(value.get("begun", ())),
-        explanations=tuple(Explanation(**one) for one in value.get("explanations", ())),
-    )
-
-
-def _events_of_json(value: Iterable[Mapping[str, Json]]) -> tuple[Event, ...]:
-    return tuple(Event(**{**one, "ids": tuple(map(int, one["ids"]))}) for one in value)
-
-
-def _row_to_json(rows: Tracks, i: int, frame: int) -> Json:
-    row: dict[str, Json] = {"id": int(rows.ids[i]), "box": short_row(rows.boxes[i])}
-    if rows.frames[i] != frame:
-        row["frame"], row["time"] = int(rows.frames[i]), float(rows.times[i])
-    row["status"] = Status(rows.status[i]).word
-    row["confidence"] = short(rows.confidence[i])
-    believed, outline, ground = rows.believed[i], rows.outlines[i], rows.ground[i]
-    optional = {
-        "class": str(rows.classes[i]),
-        "group": int(rows.groups[i]),
-        "inferred": bool(rows.inferred[i]),
-        "hidden_side": str(rows.hidden_side[i]),
-        "links": list(rows.links[i]),
-        "ground": None if ground is None else [one for one in ground if one is not None],
-        "believed": None if believed is None else mask_to_json(believed),
-        "outline": None if outline is None else outline_to_json(outline),
-        "mask": mask_to_json(rows.masks[i]) if rows.masks[i].bits.size else None,
-    }
-    return row | {key: value for key, value in optional.items() if value}
-
-
-def _rows_of_json(rows: list[Json], frame: int, time: float, with_masks: bool) -> Tracks:
-    if not rows:
-        return Tracks.empty()
-    return Tracks.of(
-        frames=[row.get("frame", frame) for row in rows],
-        times=[row.get("time", time) for row in rows],
-        ids=[row["id"] for row in rows],
-        boxes=np.array([row["box"] for row in rows], np.float32),
-        status=[Status[row["status"].upper()] for row in rows],
-        confidence=[row["confidence"] for row in rows],
-        classes=[row.get("class", "") for row in rows],
-        groups=[row.get("group", 0) for row in rows],
-        inferred=[row.get("inferred", False) for row in rows],
-        hidden_side=[row.get("hidden_side", "") for row in rows],
-        links=[tuple(map(int, row.get("links", ()))) for row in rows],
-        ground=[Ground(*map(float, row["ground"])) if "ground" in row else None for row in rows],
-        believed=[mask_of_json(row["believed"]) if with_masks and "believed" in row else None for row in rows],
-        outlines=[outline_of_json(row["outline"]) if with_masks and "outline" in row else None for row in rows],
-        masks=[mask_of_json(row["mask"]) if with_masks and "mask" in row else _NO_MASK for row in rows],
-    )
-
-
-_NO_MASK = Mask.empty()

@@ -12,6 +12,7 @@ import numpy as np
 from perdure.errors import FormatError
 from perdure.files.lines import Line, line_at, mask_of_json, mask_to_json, read_lines, short, short_row, to_line
 from perdure.files.mot import read_detections
+from perdure.files.room import Room
 from perdure.files.span import cut, shown
 from perdure.files.whole import whole_file
 from perdure.types import Event, Frame, Mask, Regions
@@ -19,6 +20,7 @@ from perdure.types.regions import FARTHEST
 
 FORMAT, VERSION = "perdure-regions", 1
 _LAST = 10**9  # frame
+_LEAST_BYTES = 64  # of a region in a line
 
 
 def write_regions(path: Path, seen: Iterable[tuple[Frame, Regions]]) -> int:
@@ -152,11 +154,12 @@ def _of_line(value: Mapping[str, Any]) -> Regions:
     blind = value.get("blind", False)
     if type(blind) is not bool:
         raise ValueError("blind must be true or false")
+    room = Room(len(boxes) * _LEAST_BYTES)
     regions = Regions.of(
         np.array(boxes, np.float32).reshape(-1, 4),
         scores,
         classes,
-        [Mask.empty() if one is None else mask_of_json(one) for one in masks],
+        [Mask.empty() if one is None else room.keep(mask_of_json(one)) for one in masks],
     )
     return dataclasses.replace(regions, events=_events(value.get("events", []), value.get("frame")), blind=blind)
 

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError
-from perdure.files.lines import check_header, why_not_json
+from perdure.files.lines import check_header, json_of, why_not_json
 from perdure.files.log import FORMAT, VERSION
+from perdure.files.reports import check_report
 from perdure.types import Dropped, Event, Explanation, Renamed, Status
 
 _SHAPES = re.compile(rb',"(?:mask|believed|outline)":\{[^{}]*\}')
 _STATUS = {one.word: int(one) for one in Status}
 _TAIL = 256  # bytes
-_LARGEST = 2**53  # of a whole number that a browser holds exactly
 SIDES = {"left": 1, "top": 2, "right": 4, "bottom": 8}
 Json = Any
 
@@ -186,7 +186,7 @@ class Ledger:
         """Take up a line; FormatError, with nothing taken up, if it is damaged."""
         self._lines += 1
         try:
-            value = json.loads(_SHAPES.sub(b"", raw))
+            value = json_of(_SHAPES.sub(b"", raw))
         except (ValueError, RecursionError) as error:
             raise FormatError(f"{self.path}, line {self._lines}: not JSON ({why_not_json(error)})") from error
         if not isinstance(value, Mapping):
@@ -200,21 +200,19 @@ class Ledger:
             raise FormatError(f"{self.path}, line {self._lines}: not a report ({error!r:.100})") from error
 
     def _take_report(self, value: Mapping[str, Json]) -> None:
-        frame, instant, number = int(value["frame"]), float(value["time"]), len(self.offsets)
-        if not -1 <= frame < _LARGEST or not np.isfinite(instant):
-            raise ValueError("frame or time is out of range")
+        (frame, instant), number = check_report(value, self.frames[-1] if self.frames else -1), len(self.offsets)
         rows = _rows(value["rows"], frame, number)
         events = [
-            (number, place, Event(**{**one, "ids": tuple(map(int, one["ids"]))}))
+            (number, place, Event(**{**one, "ids": tuple(one["ids"])}))
             for place, one in enumerate(value.get("events", ()))
         ]
-        changes = [(number, Renamed(*map(int, one))) for one in value.get("renamed", ())]
-        drops = [(number, Dropped(*map(int, one))) for one in value.get("dropped", ())]
+        changes = [(number, Renamed(*one)) for one in value.get("renamed", ())]
+        drops = [(number, Dropped(*one)) for one in value.get("dropped", ())]
         reasons = value.get("explanations", ())
         narrow = [one for reason in reasons if (one := _narrow(reason, number, frame)) is not None]
         for name, column in rows.items():
             self._rows[name].extend(column)
-        self.classes |= {row["id"]: str(row["class"]) for row in value["rows"] if "class" in row}
+        self.classes |= {row["id"]: row["class"] for row in value["rows"] if "class" in row}
         self.events += events
         self.corrections += [*changes, *drops]
         self.narrow += narrow
@@ -226,12 +224,8 @@ class Ledger:
 
 
 def _rows(rows: Json, frame: int, number: int) -> dict[str, array[Any]]:
-    """The columns of a report's rows; ValueError and its kin if one is damaged."""
-    if not isinstance(rows, list):
-        raise ValueError("rows must be a list")
+    """The columns of a report's rows, which were found good."""
     boxes = array("f", (side for row in rows for side in row["box"]))
-    if len(boxes) != 4 * len(rows) or not np.isfinite(np.array(boxes)).all():
-        raise ValueError("a box must have four finite sides")
     columns: dict[str, Any] = {
         "frames": [row.get("frame", frame) for row in rows],
         "ids": [row["id"] for row in rows],
@@ -243,8 +237,6 @@ def _rows(rows: Json, frame: int, number: int) -> dict[str, array[Any]]:
         "numbers": [number] * len(rows),
         "places": range(len(rows)),
     }
-    if any(not 0 < one < _LARGEST for one in columns["ids"]):
-        raise ValueError("an id must be a whole number from 1")
     return {name: array(_CODES[name], column) for name, column in columns.items()} | {"boxes": boxes}
 
 
@@ -259,8 +251,8 @@ def _narrow(reason: Json, number: int, frame: int) -> tuple[int, int, int, int, 
     """A link that another id would have had nearly as well; None for one that is sure."""
     figures = reason["figures"]
     for name, score in figures.items():
-        if name.startswith("runner_up:"):
+        if name.startswith("runner_up:") and name[10:].isdecimal():
             margin = float(figures.get("score", 0.0)) - float(score)
             if margin < _NARROW:
-                return number, frame, int(reason["id"]), int(name.partition(":")[2]), margin
+                return number, frame, reason["id"], int(name[10:]), margin
     return None

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from perdure.errors import FormatError
-from perdure.files.lines import why_not_json
+from perdure.files.lines import json_of, why_not_json
 from perdure.files.span import shown
 
 LONGEST_SIDE, LARGEST_AREA = 1 << 16, 1 << 28  # px, of a picture
@@ -17,13 +17,11 @@ LONGEST_SIDE, LARGEST_AREA = 1 << 16, 1 << 28  # px, of a picture
 def read_json(path: Path) -> Any:
     """Return the value of a file; FormatError says where it is not JSON."""
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=_no_number)
+        return json_of(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or error}") from error
     except json.JSONDecodeError as error:
         raise FormatError(f"{path}, line {error.lineno}: not JSON ({error.msg}); is the file whole?") from error
-    except _NotANumber as error:
-        raise FormatError(f"{path}: {error} is not a number that JSON has; give null or leave it out") from error
     except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: not JSON ({why_not_json(error)})") from error
 
@@ -40,11 +38,3 @@ def size_of(place: object, value: Mapping[str, Any]) -> tuple[int, int]:
     if height * width > LARGEST_AREA:
         raise FormatError(f"{place}: a picture of {width}x{height} is too large")
     return height, width
-
-
-class _NotANumber(ValueError):
-    """NaN or an infinity."""
-
-
-def _no_number(word: str) -> NoReturn:
-    raise _NotANumber(word)
