@@ -229,3 +229,11 @@ def test_an_array_that_says_another_size_than_it_has_takes_no_room(shape: str):
     assert content["0.npy"] != array
     with pytest.raises(StateError, match="damaged"):
         load(packed(content, zipfile.ZIP_STORED), Whole)
+
+
+@pytest.mark.parametrize("change", [b"'<f4L", b"('<f4", b"'|O8'"])
+def test_an_array_whose_head_is_written_otherwise_than_ours_is_damage_and_nothing_else(change: bytes):
+    content = unpacked(save(whole()))
+    content["0.npy"] = content["0.npy"].replace(b"'<f4'", change.ljust(5)[:5])
+    with pytest.raises(StateError, match="damaged"):
+        load(packed(content, zipfile.ZIP_STORED), Whole)

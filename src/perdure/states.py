@@ -23,6 +23,7 @@ import enum
 import io
 import json
 import math
+import re
 import types
 import typing
 import zipfile
@@ -145,7 +146,7 @@ def _packed(array: NDArray[Any]) -> memoryview:
 def _read_array(content: bytes) -> NDArray[Any]:
     """The array of a `.npy` file; ValueError where it says another size than it has, before it takes room."""
     file = io.BytesIO(content)
-    if np.lib.format.read_magic(file) != (1, 0):
+    if np.lib.format.read_magic(file) != (1, 0) or not _HEADER.match(content, file.tell() + 2):
         raise ValueError("an array of an unknown version")
     shape, in_columns, kind = np.lib.format.read_array_header_1_0(file)
     count = math.prod(shape)
@@ -153,6 +154,11 @@ def _read_array(content: bytes) -> NDArray[Any]:
         raise ValueError("an array that is not what it says")
     return np.ndarray(shape, kind, content, file.tell()).copy()
 
+
+# As `_packed` writes it; what NumPy makes of other headers may warn, or fail in ways of its own.
+_HEADER = re.compile(
+    rb"\{'descr': '[<>|=][a-zA-Z][0-9]+', 'fortran_order': (False|True), 'shape': \([0-9, ]*\), \} *\n"
+)
 
 _DAMAGE = (
     zipfile.BadZipFile,

@@ -69,3 +69,28 @@ def test_a_malformed_blob_is_named_with_its_line(tmp_path: Path):
     (tmp_path / "blobs.txt").write_text("1 2\n2 1+x\n")
     with pytest.raises(FormatError, match=r"line 2: '2 1\+x'"):
         read_blobs(tmp_path / "blobs.txt")
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        {"type": "occluded", "begin": 3, "end": 2, "ids": [1]},
+        {"type": "occluded", "begin": 0, "end": 2, "ids": [1]},
+        {"type": "enter", "frame": True, "ids": [1]},
+        {"type": "enter", "frame": 3, "ids": ["1"]},
+        {"type": "enter", "frame": 3, "ids": [1.9]},
+        {"type": "enter", "frame": 3, "ids": [-1]},
+    ],
+    ids=str,
+)
+def test_an_event_that_cannot_be_is_named(tmp_path: Path, event: dict):
+    (tmp_path / "clip.json").write_text(json.dumps({"events": [event]}))
+    with pytest.raises(FormatError, match="event 1: wanted are"):
+        read_clip(tmp_path / "clip.json")
+
+
+@pytest.mark.parametrize("line", ["0 1+2", "-3 1", "1_0 1", "3 0", "3 1+-2", "3 ٣", "99999999999 1"])
+def test_blobs_of_no_frame_or_nobody_are_named(tmp_path: Path, line: str):
+    (tmp_path / "blobs.txt").write_text(f"1 1+2\n{line}\n", encoding="utf-8")
+    with pytest.raises(FormatError, match="line 2"):
+        read_blobs(tmp_path / "blobs.txt")

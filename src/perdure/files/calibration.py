@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from perdure.errors import FormatError
-from perdure.files.lines import why_not_json
+from perdure.files.lines import json_with_nan, why_not_json
 from perdure.files.whole import whole_file
 from perdure.params import unknown_name
 from perdure.scene.ground import PIXEL, Ground, Unusable, of_camera, of_homography, of_projection
@@ -43,7 +43,7 @@ def read_calibration(path: str | Path, width: int, height: int) -> Ground:
     """
     place = Path(path)
     try:
-        value = json.loads(place.read_text(encoding="utf-8-sig"))
+        value = json_with_nan(place.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise FormatError(f"cannot read the calibration {place}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:

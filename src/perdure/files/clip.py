@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -46,7 +47,8 @@ def read_clip(path: Path) -> tuple[tuple[Event, ...], tuple[int, int] | None]:
             raise FormatError(
                 f"{path}, event {number}: wanted are 'type', 'frame' or 'begin' and 'end', and 'ids'"
             ) from error
-    told = (size[0], size[1]) if isinstance(size[0], int) and isinstance(size[1], int) else None
+    are_sides = all(type(side) is int and 1 <= side <= _LONGEST_SIDE for side in size)
+    told = size if are_sides else None
     return tuple(one for one in found if len(set(one.ids)) >= (2 if one.kind in ("merge", "split") else 1)), told
 
 
@@ -64,7 +66,9 @@ def read_blobs(path: Path) -> Mapping[int, tuple[frozenset[int], ...]]:
             continue
         frame, *blobs = line.split()
         try:
-            found[int(frame) - 1] = tuple(frozenset(int(one) for one in blob.split("+")) for blob in blobs)
+            found[_whole(frame, _LAST) - 1] = tuple(
+                frozenset(_whole(one, _LARGEST_ID) for one in blob.split("+")) for blob in blobs
+            )
         except ValueError as error:
             raise FormatError(
                 f"{path}, line {number}: {shown(line.strip())} is not a frame and blobs such as 1+3"
@@ -72,11 +76,24 @@ def read_blobs(path: Path) -> Mapping[int, tuple[frozenset[int], ...]]:
     return found
 
 
+def _whole(word: str, most: int) -> int:
+    """The number from 1 on that a word says; ValueError for what is none."""
+    if not re.fullmatch(r"[0-9]{1,18}", word) or not 1 <= int(word) <= most:
+        raise ValueError
+    return int(word)
+
+
 def _event(event: Mapping[str, object]) -> Event:
     kind = str(event["type"])
     begin = event["frame"] if kind in _MOMENTS else event["begin"]
     end = begin if kind in _MOMENTS else event["end"]
     ids = event["ids"]
-    if not isinstance(begin, int) or not isinstance(end, int) or not isinstance(ids, list):
+    if not isinstance(ids, list) or not {type(one) for one in (begin, end, *ids)} <= {int}:
         raise TypeError
-    return Event(kind, begin - 1, end - 1, tuple(int(one) for one in ids))
+    if not 1 <= begin <= end <= _LAST or not all(1 <= one <= _LARGEST_ID for one in ids):  # type: ignore[operator]
+        raise ValueError
+    return Event(kind, begin - 1, end - 1, tuple(ids))  # type: ignore[operator]
+
+
+_LAST, _LARGEST_ID = 10**9, 2**53  # frame, id
+_LONGEST_SIDE = 1 << 16  # px, of a picture

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from perdure.errors import FormatError
-from perdure.files.lines import why_not_json
+from perdure.files.lines import json_with_nan, why_not_json
 from perdure.files.span import shown
 from perdure.files.whole import whole_file
 from perdure.params import unknown_name
@@ -41,7 +41,7 @@ def read_context(path: str | Path) -> Context:
     try:
         if place.stat().st_size > _LARGEST:
             raise FormatError(f"{place} has more than {_LARGEST >> 20} MiB; it is no context of `perdure learn`")
-        value = json.loads(place.read_text(encoding="utf-8-sig"))
+        value = json_with_nan(place.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise FormatError(f"cannot read the context {place}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:

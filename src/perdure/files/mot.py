@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError
+from perdure.files.lines import four_digits
 from perdure.files.mot_table import MotTable, read_table
 from perdure.types import Regions, Rows, Tracks, Use
 
@@ -30,7 +31,7 @@ def write_rows(file: IO[str], rows: Tracks) -> None:
         left, top, right, bottom = (float(one) for one in box)
         file.write(
             f"{frame + 1},{identity},{left + 1:.2f},{top + 1:.2f},{right - left:.2f},{bottom - top:.2f},"
-            f"{confidence:.4g},-1,-1,-1\n"
+            f"{four_digits(confidence)},-1,-1,-1\n"
         )
 
 

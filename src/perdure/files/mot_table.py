@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError
+from perdure.files.lines import number_of
 from perdure.files.span import shown
 from perdure.types.regions import FARTHEST
 
@@ -57,12 +59,28 @@ def read_lines(path: Path) -> list[str]:
     Raises
     ------
     FormatError
-        If it cannot be read or is not text.
+        If it cannot be read or is not text, or was cut off within its last number, as far as that can be seen.
     """
     try:
-        return path.read_text(encoding="utf-8-sig").splitlines()
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise FormatError(f"cannot read {path}: {getattr(error, 'strerror', None) or 'it is not text'}") from error
+    lines = text.splitlines()
+    if text[-1:] not in ("", "\n", "\r"):
+        _refuse_cut(path, lines)
+    return lines
+
+
+def _refuse_cut(path: Path, lines: list[str]) -> None:
+    """Refuse a last line without an end whose last number has fewer decimals than that of all the others, who have as many."""
+    words = [line.replace(",", " ").split() for line in lines]
+    decimals = [_DECIMALS.fullmatch(several[-1]) for several in words if several]
+    *others, last = [len(one[1] or "") if one else -1 for one in decimals] or [-1]
+    if len(others) >= _MANY and len(set(others)) == 1 and 0 <= last < others[0]:
+        raise FormatError(
+            f"{path}, line {len(lines)}: its last number has fewer decimals than those above it, and the line has no end:"
+            " the file was cut off; take it anew, or end the line if it is whole"
+        )
 
 
 def _quickly(lines: list[str]) -> NDArray[np.float64] | None:
@@ -126,12 +144,14 @@ def _cells(path: Path, number: int, line: str) -> list[str]:
 
 def _number(path: Path, number: int, word: str) -> float:
     try:
-        return float(word)
+        return number_of(word)
     except ValueError:
         raise FormatError(
             f"{path}, line {number}: {shown(word)} is no number; wanted are frame, id, left, top, …"
         ) from None
 
 
+_DECIMALS = re.compile(r"[-+]?[0-9]+(?:\.([0-9]*))?")
+_MANY = 10  # lines that say how many decimals there are
 _LAST = 10**9  # frame
 _SUREST = 1e30  # beyond which a span of scores might not be a number

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from perdure.errors import FormatError
 from perdure.features.masks import of_picture_runs, picture_runs
 from perdure.files import mot_table
+from perdure.files.room import Room
 from perdure.files.span import shown
 from perdure.types import Mask, Rows, Tracks, Use
 
@@ -67,11 +68,13 @@ def read_lines(path: Path) -> list[MotsRow]:
     """Return what the lines of a MOTS file say, in their order; refused is what `read_masks` refuses."""
     rows: list[MotsRow] = []
     seen: dict[tuple[int, int], int] = {}
+    room = Room(path.stat().st_size if path.is_file() else 0)
     for number, line in enumerate(mot_table.read_lines(path), 1):
         if not line.strip():
             continue
         try:
             row = _row(line)
+            room.keep(row.mask)
             if rows and row.size != rows[0].size:
                 raise ValueError(f"its picture is {_by(row.size)}, the first line's {_by(rows[0].size)}")
             if row.use is Use.SCORED:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from perdure.detect.layouts import Port, recognised
 from perdure.detect.letterbox import GREY
 from perdure.detect.network import Model
 from perdure.errors import FormatError, ParameterError
+from perdure.files.lines import json_with_nan
 from perdure.files.models import check_model_file, open_session
 
 ENGINES = ("onnx", "openvino")
@@ -89,7 +89,7 @@ def names_of(metadata: Mapping[str, str]) -> tuple[str, ...]:
     """
     text = metadata.get("names", "")
     value: Any = metadata.get("labels", "").split()
-    for read in (json.loads, ast.literal_eval):
+    for read in (json_with_nan, ast.literal_eval):
         if text and len(text) <= _LONGEST:
             try:
                 value = read(text)

@@ -18,6 +18,7 @@ from perdure import __version__
 from perdure.errors import FormatError, OutputError
 from perdure.files.corrections import NAME as CORRECTIONS
 from perdure.files.corrections import read_corrections
+from perdure.files.lines import json_with_nan
 from perdure.files.log import Entry, read_log
 from perdure.files.mot import write_rows
 from perdure.files.whole import cannot_write, whole_file
@@ -166,7 +167,7 @@ class RunFolder:
         """
         place = self.path / "run.json"
         try:
-            about = json.loads(place.read_text(encoding="utf-8"))
+            about = json_with_nan(place.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return {}
         except (OSError, ValueError, RecursionError) as error:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from perdure.errors import ParameterError
+from perdure.files.lines import json_with_nan
 
 
 def read_settings(given: str | Path, option: str) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def read_settings(given: str | Path, option: str) -> dict[str, Any]:
                 f"cannot read {what[:200]}: {reason}; {option} takes a JSON object or a file of one"
             ) from error
     try:
-        value = json.loads(text)
+        value = json_with_nan(text)
     except (ValueError, RecursionError) as error:
         raise ParameterError(f"{what[:200]} is not JSON: {error}") from error
     if not isinstance(value, dict):

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from perdure.errors import FormatError, ParameterError
-from perdure.files.lines import why_not_json
+from perdure.files.lines import json_with_nan, why_not_json
 from perdure.files.span import shown
 from perdure.files.whole import whole_file
 from perdure.params import unknown_name
@@ -62,7 +62,7 @@ def read_zones(path: str | Path, width: int = 0, height: int = 0) -> Zones:
     except UnicodeDecodeError:
         raise FormatError(f"{path} is not JSON: it is not text") from None
     try:
-        written = json.loads(text)
+        written = json_with_nan(text)
     except (ValueError, RecursionError) as error:
         line = f", line {error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
         raise FormatError(f"{path}{line}: not JSON ({why_not_json(error)})") from None

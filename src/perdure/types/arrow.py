@@ -182,6 +182,8 @@ def _some_mask(value: Mapping[str, Any]) -> Mask:
     height, width, x, y = (int(value[name]) for name in ("height", "width", "x", "y"))
     if not (0 <= height <= _LONGEST and 0 <= width <= _LONGEST and height * width <= _LARGEST):
         raise ValueError(f"a mask of {width}x{height} cannot be")
+    if max(abs(x), abs(y)) > _FAR:
+        raise ValueError(f"a mask at ({x}, {y}) is too far out")
     return of_run_lengths(value["runs"], y, x, height, width)
 
 
@@ -201,4 +203,4 @@ def _ground(table: pyarrow.Table) -> list[Ground | None]:
 
 
 _METRES = ("ground_x", "ground_y", "ground_speed")  # m, m/s
-_LONGEST, _LARGEST = 1 << 15, 1 << 28  # px
+_LONGEST, _LARGEST, _FAR = 1 << 15, 1 << 28, 10**6  # px

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from format_rows import content, everything
+from hostile.trying import bounded
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -115,6 +116,20 @@ WRONG = [
     ("a.txt", kitti(y2="four"), "line 1: 'four' in column 10 is no number"),
     ("a.txt", kitti(hidden="5"), "line 1: occluded is 5; wanted is 0, 1, 2 or 3"),
     ("a.txt", kitti() + "0 2 Car 0\n", "line 2: 4 words; a row has 17, or 18 with its score"),
+    ("a.txt", kitti(id="1_0"), "line 1: '1_0' in column 2 is no number"),
+    (
+        "a.txt",
+        kitti()[:-1] + " 0.75\n" + kitti(id="2"),
+        "line 2: 17 words where others have 18; is the file whole",
+    ),
+    (
+        "a.txt",
+        "".join(f"{k},1,0,0,5,0.75\n" for k in range(1, 20)) + "20,1,0,0,5,0.7",
+        "line 20: its last number has",
+    ),
+    ("a.txt", "1,1,0,0,5,1_0\n", "line 1: '1_0' is no number"),
+    ("a.csv", NAMES.replace("status", "ground_x") + "0,1,1,2,3,4,nan,\n", "a place or speed on the ground nan"),
+    ("a.csv", NAMES + "0,\u0661,1,2,3,4,visible,\n", "in column 'id' is no number"),
     (
         "a.csv",
         NAMES + "0,1,1,2,3,4,visible,\n0,1,5,5,6,6,visible,\n",
@@ -184,6 +199,7 @@ WRONG = [
     ("a.json", video(annotations={}), "'annotations' must be a list, not a table"),
     ("a.json", video(annotations=[3]), "annotations 1: wanted is an object, not 3"),
     ("a.json", video()[:-9], "line 1: not JSON .*is the file whole"),
+    ("a.json", video(categories=[{"id": 1, "name": "d\ud800g"}]), "half of a surrogate pair stands alone"),
     ("a.json", "[" * 100_000, "nested too deep"),
     (
         "a.json",
@@ -209,6 +225,16 @@ WRONG = [
     ("a.xml", cvat(box(xtl="7")), "a box from \\(7, 2\\) to \\(3, 4\\) is inside out"),
     ("a.xml", cvat(box(frame="0") + box(frame="900000000")), "frames 0 to 900000000 of track 1 are too many"),
     ("a.xml", cvat(box(), track='<track id="-1" label="car">{}</track>'), "id -1 is not from 0"),
+    (
+        "a.xml",
+        cvat('<polygon frame="0" points="0,0;99999,0;99999,99999"/>'),
+        "line 1, frame 0: .*too large to be drawn",
+    ),
+    (
+        "a.xml",
+        cvat(box(frame="0") + box(frame="300999")),
+        "frames 0 to 300999 of track 1 are too many to be filled",
+    ),
     ("a.xml", cvat(mask(rle="1, 2")), "the rle does not fill the mask's 2x2 pixels"),
     ("a.xml", cvat(mask(rle="a")), "rle must be whole numbers"),
     ("a.xml", cvat(mask(width="99999")), "a mask of 99999x2 at"),
@@ -256,6 +282,7 @@ def test_a_parquet_file_is_told_column_and_row(tmp_path: Path):
         ({"status": flags}, "row 1: column 'status' cannot be read"),
         ({"mask": pa.array([None, bits])}, "row 1: column 'mask' cannot be read"),
         ({"mask": pa.array([None, bits | {"height": 2**30}])}, "row 1: column 'mask' cannot be read"),
+        ({"mask": pa.array([None, bits | {"runs": [1, 3], "x": 2**30}])}, "row 1: column 'mask' .* too far out"),
         ({"id": None}, "it has no column 'id'"),
     ):
         table = good
@@ -263,6 +290,76 @@ def test_a_parquet_file_is_told_column_and_row(tmp_path: Path):
             place = table.column_names.index(column)
             table = table.remove_column(place) if values is None else table.set_column(place, column, values)
         pq.write_table(table, path)
+        with pytest.raises(FormatError, match=why):
+            read(path, FORMATS["parquet"])
+
+
+def test_a_last_number_that_is_as_long_as_the_others_needs_no_line_end(tmp_path: Path):
+    text = "".join(f"{k},1,0,0,5,{k / 4:.2f}\n" for k in range(1, 20))
+    for ending in ("20,1,0,0,5,0.75", "20,1,0,0,5,5.125", "20,1,0,0,5,5\n"):
+        (tmp_path / "a.txt").write_text(text + ending)
+        assert len(read(tmp_path / "a.txt", FORMATS["mot"]).tracks) == 20
+
+
+def test_scores_beyond_one_are_not_rounded_away(tmp_path: Path):
+    tracks = Tracks.of(
+        frames=[0, 1], times=0.0, ids=[1, 1], boxes=[[0, 0, 1, 1]] * 2, confidence=[98.7654, 12345.5]
+    )
+    for name in ("mot", "csv"):
+        path = tmp_path / f"a{FORMATS[name].suffixes[0]}"
+        FORMATS[name].write(path, content(tracks), overwrite=False)
+        assert np.allclose(read(path, FORMATS[name]).tracks.confidence, tracks.confidence, atol=1e-4, rtol=0)
+
+
+def test_a_film_of_ten_million_frames_takes_no_room_where_nothing_is_seen(tmp_path: Path):
+    row = {"id": 1, "video_id": 1, "category_id": 1}
+    film = {"id": 1, "width": 8, "height": 8, "length": 10**7}
+    value = {"videos": [film], "annotations": [row] * 200, "categories": [{"id": 1, "name": "dog"}]}
+    (tmp_path / "a.json").write_text(json.dumps(value))
+    with bounded(seconds=2.0, mib=200):
+        found = read(tmp_path / "a.json", FORMATS["coco-vis"])
+    assert (len(found.tracks), len(found.frames or ())) == (0, 10**7)
+
+
+@pytest.mark.parametrize("name", ["a.geojson", "a.xml"])
+def test_a_silhouette_that_leaves_its_picture_is_cut(tmp_path: Path, name: str):
+    size = "<meta><task><original_size><width>3</width><height>2</height></original_size></task></meta>"
+    text = cvat(mask(), track=size + '<track id="1" label="car">{}</track>')
+    if name == "a.geojson":
+        value = json.loads(geojson(outline="seen"))
+        text = json.dumps(value | {"picture": {"width": 3, "height": 2}})
+    (tmp_path / name).write_text(text)
+    found = read(tmp_path / name, recognised(tmp_path / name))
+    assert any(one.area for one in found.tracks.masks)
+    for one in found.tracks.masks:
+        assert one.area == 0 or (one.box[2] <= 3 and one.box[3] <= 2)
+
+
+def test_a_few_bytes_cannot_unfold_into_all_of_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("perdure.files.room._LEAST", 1000)
+    monkeypatch.setattr("perdure.files.room._EACH", 1)
+    side = 30
+    rows = [{"track_id": k, "segmentation": {"size": [side, side], "counts": [0, side**2]}} for k in (1, 2)]
+    pictures = [{"id": 1, "frame_id": 0, "width": side, "height": side}]
+    (tmp_path / "a.json").write_text(video(rows, images=pictures))
+    with pytest.raises(FormatError, match="annotation 2: its silhouettes unfold into more pixels"):
+        read(tmp_path / "a.json", FORMATS["coco-video"])
+
+
+def test_what_a_parquet_file_tells_of_its_film_must_be_able_to_be(tmp_path: Path):
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "a.parquet"
+    table = Tracks.of(frames=[0], times=[0.0], ids=[1], boxes=[[0, 0, 1, 1]]).to_arrow()
+    for told, why in (
+        ("[]", "no JSON object"),
+        ('{"fps": "25"}', "the fps of its description, '25', cannot be"),
+        ('{"fps": NaN}', "a.parquet"),
+        ('{"size": [-1, 8]}', "height and width must be whole numbers"),
+        ('{"size": 8}', "the size of its description"),
+        ('{"frames": [0, 1.5]}', "no list of frames"),
+    ):
+        pq.write_table(table.replace_schema_metadata({b"perdure": told}), path)
         with pytest.raises(FormatError, match=why):
             read(path, FORMATS["parquet"])
 

@@ -54,7 +54,7 @@ def read(path: Path, reading: Reading) -> Content:
     return Content(
         tracks,
         size,
-        tuple(range(length)),
+        range(length),
         fps=coco.rate_told(video),
         name=coco.video_name(video),
         images=dict(enumerate(video.get("file_names", ()))),
@@ -81,6 +81,8 @@ def _add(
     length: int,
 ) -> None:
     """Take up the rows of a track."""
+    if not any(annotation.get(name) for name in _LISTS):
+        return  # seen nowhere
     masks, boxes = (annotation.get(name) or [None] * length for name in _LISTS)
     for name, several in zip(_LISTS, (masks, boxes), strict=True):
         if not isinstance(several, list) or len(several) != length:

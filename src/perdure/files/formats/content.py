@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perdure.errors import FormatError, ParameterError
+from perdure.features.masks import disjoint
 from perdure.files.formats.traits import Trait
+from perdure.files.room import Room
 from perdure.types import Ground, Mask, Outline, Status, Tracks
 from perdure.types.regions import FARTHEST
 
@@ -32,7 +34,7 @@ class Content:
         All its rows, in the order of (frame, id).
     size : (int, int) or None
         Height and width of the pictures, where the file says.
-    frames : tuple of int or None
+    frames : sequence of int or None
         All frames of the film, also those without a row, where the file says; ascending.
     fps : float or None
         Frames a second, where the file says; for the times of rows that have none.
@@ -48,7 +50,7 @@ class Content:
 
     tracks: Tracks
     size: tuple[int, int] | None = None
-    frames: tuple[int, ...] | None = None
+    frames: Sequence[int] | None = None
     fps: float | None = None
     timed: bool = False
     name: str = ""
@@ -137,6 +139,7 @@ class Gathering:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._rows: list[dict[str, Any]] = []
+        self._room = Room(path.stat().st_size if path.is_file() else 0)
         self._seen: dict[tuple[int, int], str] = {}
 
     def __len__(self) -> int:
@@ -178,6 +181,10 @@ class Gathering:
         earlier = self._seen.setdefault((number, name), place)
         if earlier is not place:
             raise self.refuse(place, f"frame {number} has id {name} already, in {earlier}; keep one of the two")
+        try:
+            self._room.take(one.bits.size for one in (mask, believed) if one is not None)
+        except ValueError as error:
+            raise self.refuse(place, error) from None
         self._rows.append(
             {
                 "frames": number,
@@ -193,7 +200,7 @@ class Gathering:
                 "believed": believed,
                 "outlines": outline,
                 "hidden_side": hidden_side,
-                "ground": ground,
+                "ground": self._ground(place, ground),
             }
         )
 
@@ -217,6 +224,12 @@ class Gathering:
             raise self.refuse(place, f"{name} {value!r} is not a number that can be")
         return float(value)
 
+    def _ground(self, place: str, ground: Ground | None) -> Ground | None:
+        for one in ground or ():
+            if one is not None:
+                self._real(place, "a place or speed on the ground", one, LAST)
+        return ground
+
     def _box(self, place: str, box: Iterable[Any]) -> tuple[float, ...]:
         sides = tuple(
             self._real(place, f"{side} of the box", one, FARTHEST) for side, one in zip(_SIDES, box, strict=True)
@@ -234,6 +247,14 @@ def counted_from_one(tracks: Tracks) -> tuple[Tracks, tuple[str, ...]]:
         return tracks, ()
     groups = np.where(tracks.groups > 0, tracks.groups + 1, 0)
     return tracks.replace(ids=tracks.ids + 1, groups=groups), ("ids count from 0 there; here each is one more",)
+
+
+def cut_to(tracks: Tracks, size: tuple[int, int] | None) -> Tracks:
+    """Return the rows without those pixels of silhouettes that leave a picture (height, width), where it is known."""
+    if size is None or not any(mask.bits.size for mask in tracks.masks):
+        return tracks
+    cut = (disjoint([mask], *size)[0] if mask.bits.size else mask for mask in tracks.masks)
+    return tracks.replace(masks=tuple(cut))
 
 
 def with_times(content: Content, fps: float | None) -> Content:

@@ -12,11 +12,11 @@ from xml.parsers import expat
 import numpy as np
 
 from perdure.errors import FormatError
-from perdure.features.masks import disjoint
 from perdure.features.outlines import mask_of
 from perdure.files.formats.coco import UNNAMED
-from perdure.files.formats.content import LAST, MOST_FRAMES, Content, Gathering, Reading, counted_from_one
+from perdure.files.formats.content import LAST, MOST_FRAMES, Content, Gathering, Reading, counted_from_one, cut_to
 from perdure.files.formats.jsons import LARGEST_AREA, LONGEST_SIDE
+from perdure.files.lines import number_of
 from perdure.files.span import shown
 from perdure.types import Mask, Outline, Status
 
@@ -94,8 +94,7 @@ class _Reader:
         self._track: tuple[float, str] | None = None
         self._shapes: list[_Shape] = []
         self._attribute = ""
-        self._others = 0
-        self._has_polygons = False
+        self._others = self._filled = 0
         self._tasks: set[str] = set()
 
     def begin(self, tag: str, attributes: dict[str, str]) -> None:
@@ -147,14 +146,11 @@ class _Reader:
         """Return what the whole file says."""
         size, told = self._size(), self._told
         count = told.get(("task", "size"), told.get(("job", "size"), ""))
-        frames = tuple(range(int(count))) if count.isdecimal() and int(count) <= MOST_FRAMES else None
+        frames = range(int(count)) if count.isdecimal() and int(count) <= MOST_FRAMES else None
         tracks, notes = counted_from_one(self._rows.tracks())
-        if size is not None and self._has_polygons:  # what leaves the picture is cut
-            cut = [disjoint([mask], *size)[0] if mask.bits.size else mask for mask in tracks.masks]
-            tracks = tracks.replace(masks=tuple(cut))
         if self._others:
             notes = (*notes, f"shapes that are no boxes, polygons or masks left out: {self._others}")
-        return Content(tracks, size, frames, name=told.get(("task", "name"), ""), notes=notes)
+        return Content(cut_to(tracks, size), size, frames, name=told.get(("task", "name"), ""), notes=notes)
 
     # Shapes ---
 
@@ -169,7 +165,6 @@ class _Reader:
             points = self._corners(attributes)
         elif tag == "polygon":
             points = self._points(attributes.get("points", ""))
-            self._has_polygons = True
         else:
             mask = self._mask(attributes)
         return _Shape(self._line, int(frame), outside, occluded, not is_key, points, mask, tag == "polygon")
@@ -187,7 +182,7 @@ class _Reader:
 
     def _points(self, text: str) -> np.ndarray[Any, Any]:
         try:
-            points = np.array([[float(one) for one in pair.split(",")] for pair in text.split(";")])
+            points = np.array([[number_of(one) for one in pair.split(",")] for pair in text.split(";")])
         except ValueError:
             points = np.zeros(0)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3 or not (np.abs(points) <= _FAR).all():
@@ -234,9 +229,11 @@ class _Reader:
 
     def _fill(self, shape: _Shape, following: _Shape) -> None:
         gap = following.frame - shape.frame
-        if len(self._rows) + gap > MOST_FRAMES:
+        self._filled += gap
+        if self._filled > _FILLED + _FILLED_EACH * len(self._rows):
             self._refuse(
-                f"frames {shape.frame} to {following.frame} of track {self._name} are too many to be filled in"
+                f"frames {shape.frame} to {following.frame} of track {self._name} are too many to be filled in;"
+                " list the track in some of them"
             )
         goes_on = following.points.shape == shape.points.shape and following.is_polygon == shape.is_polygon
         target = following.points if goes_on else shape.points
@@ -250,7 +247,10 @@ class _Reader:
         mask, outline = shape.mask, None
         if shape.is_polygon:
             outline = _outline_of(points)
-            mask = mask_of(outline)
+            try:
+                mask = mask_of(outline)
+            except ValueError as error:
+                raise self._rows.refuse(place, error) from None
             points = np.stack([points.min(axis=0), points.max(axis=0)])
         box = points.ravel().tolist() if shape.mask is None else shape.mask.box
         status, confidence = self._status(place, shape), self._confidence(place, shape)
@@ -275,7 +275,7 @@ class _Reader:
     def _confidence(self, place: str, shape: _Shape) -> float:
         text = shape.attributes.get("confidence", "1")
         try:
-            return float(text)
+            return number_of(text)
         except ValueError:
             raise self._rows.refuse(place, f"confidence {shown(text)} is no number") from None
 
@@ -292,7 +292,7 @@ class _Reader:
     def _number(self, attributes: Mapping[str, str], name: str) -> float:
         text = attributes.get(name)
         try:
-            value = float(text) if text is not None else math.nan
+            value = number_of(text) if text is not None else math.nan
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
@@ -327,4 +327,5 @@ def _outline_of(points: np.ndarray[Any, Any]) -> Outline:
 
 _FLAGS = {"outside": "0", "occluded": "0", "keyframe": "1"}
 _DEEPEST = 16
+_FILLED, _FILLED_EACH = 300_000, 100  # rows between those that are listed: of a file, and more for each row
 _FAR = 1 << 17  # px

@@ -11,7 +11,7 @@ import numpy as np
 from perdure.errors import FormatError
 from perdure.features.outlines import mask_of
 from perdure.files.contours import write_features, write_geojson_begin, write_geojson_end
-from perdure.files.formats.content import Content, Format, Gathering, Reading, counted_from_one
+from perdure.files.formats.content import Content, Format, Gathering, Reading, counted_from_one, cut_to
 from perdure.files.formats.jsons import read_json, size_of
 from perdure.files.formats.traits import ALL, Trait
 from perdure.files.span import shown
@@ -47,7 +47,7 @@ def read(path: Path, reading: Reading) -> Content:
     about = value.get("picture")
     size = size_of(path, about) if isinstance(about, Mapping) and "width" in about else None
     timed = any("time" in feature["properties"] for feature in features)
-    return Content(tracks, size=size, timed=timed, notes=notes)
+    return Content(cut_to(tracks, size), size=size, timed=timed, notes=notes)
 
 
 def write(path: Path, content: Content, *, overwrite: bool) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from perdure.files.formats.content import Content, Format, Gathering, Reading, counted_from_one
 from perdure.files.formats.traits import Trait
-from perdure.files.lines import short
+from perdure.files.lines import number_of, short
 from perdure.files.mot_table import read_lines
 from perdure.files.span import shown
 from perdure.files.whole import refuse_existing, whole_file
@@ -39,13 +39,18 @@ def read(path: Path, reading: Reading) -> Content:
     FormatError
         Naming file and line.
     """
-    rows, areas = Gathering(path), 0
+    rows, areas, columns = Gathering(path), 0, 0
     for number, line in enumerate(read_lines(path), 1):
         words = line.split()
         if words[2:3] == [AREA]:
             areas += 1
         elif words:
             _add(rows, f"line {number}", words)
+            columns = columns or len(words)
+            if len(words) != columns:
+                raise rows.refuse(
+                    f"line {number}", f"{len(words)} words where others have {columns}; is the file whole?"
+                )
     tracks, notes = counted_from_one(rows.tracks())
     if areas:
         notes = (*notes, f"areas of type {AREA} left out: {areas}")
@@ -58,7 +63,7 @@ def _add(rows: Gathering, place: str, words: list[str]) -> None:
     numbers: dict[int, float] = {}
     for column in (0, 1, 4, 6, 7, 8, 9, *range(COLUMNS, len(words))):
         try:
-            numbers[column] = float(words[column])
+            numbers[column] = number_of(words[column])
         except ValueError:
             raise rows.refuse(place, f"{shown(words[column])} in column {column + 1} is no number") from None
     if numbers[4] not in (-1, 0, 1, 2, 3):

@@ -70,7 +70,7 @@ def _with_sequence(content: Content, file: Path) -> Content:
     if not file.is_file():
         return content
     told = read_seqinfo(file)
-    frames = tuple(range(told.length)) if told.length <= MOST_FRAMES else None
+    frames = range(told.length) if told.length <= MOST_FRAMES else None
     return content.replace(
         size=(told.height, told.width), fps=told.rate, name=file.resolve().parent.name, frames=frames
     )

@@ -5,13 +5,18 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from perdure.errors import FormatError
 from perdure.files.formats.checked import checked
-from perdure.files.formats.content import Content, Format, Reading
+from perdure.files.formats.content import LAST, Content, Format, Reading
+from perdure.files.formats.jsons import LARGEST_AREA, size_of
 from perdure.files.formats.traits import ALL
+from perdure.files.lines import json_of
+from perdure.files.room import Room
+from perdure.files.span import shown
 from perdure.files.whole import cannot_write, refuse_existing
 from perdure.types.arrow import arrow, of_arrow, to_arrow
 
@@ -33,17 +38,10 @@ def read(path: Path, reading: Reading) -> Content:
 
     try:
         table = pyarrow.parquet.read_table(path)
+        _check_room(path, table)
         tracks = of_arrow(table)
-        told = json.loads((table.schema.metadata or {}).get(_KEY, b"{}"))
-        size, frames = told.get("size"), told.get("frames")
-        content = Content(
-            tracks,
-            size=None if size is None else (int(size[0]), int(size[1])),
-            frames=None if frames is None else tuple(map(int, frames)),
-            fps=told.get("fps"),
-            timed="time" in table.column_names,
-            name=str(told.get("name", "")),
-        )
+        told = json_of((table.schema.metadata or {}).get(_KEY, b"{}"))
+        content = _described(path, Content(tracks, timed="time" in table.column_names), told)
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or _first_line(error)}") from error
     except (
@@ -84,6 +82,46 @@ def write(path: Path, content: Content, *, overwrite: bool) -> int:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
     return len(content.tracks)
+
+
+def _check_room(path: Path, table: Any) -> None:
+    """Refuse silhouettes that are too large together, before they are unfolded; what is none is refused later."""
+    import pyarrow.compute as pc
+
+    room = Room(path.stat().st_size)
+    for name in ("mask", "believed"):
+        kind = table.schema.field(name).type if name in table.column_names else None
+        if kind is not None and {"height", "width"} <= {one.name for one in getattr(kind, "fields", ())}:
+            sides = [pc.struct_field(table.column(name), side).to_pylist() for side in ("height", "width")]
+            areas = [high * wide for high, wide in zip(*sides, strict=True) if type(high) is type(wide) is int]
+            room.take(area for area in areas if 0 <= area <= LARGEST_AREA)  # others are refused each by itself
+
+
+def _described(path: Path, content: Content, told: Any) -> Content:
+    """The content with what a file's description tells of its film; ValueError where that cannot be."""
+    if not isinstance(told, Mapping):
+        raise ValueError("its description is no JSON object")
+    frames, fps = told.get("frames"), told.get("fps")
+    if frames is not None and not (
+        isinstance(frames, list)
+        and {type(one) for one in frames} <= {int}
+        and all(0 <= one <= LAST for one in frames)
+    ):
+        raise ValueError("the frames of its description are no list of frames")
+    if fps is not None and not (type(fps) in (int, float) and 0 < fps <= _FASTEST):
+        raise ValueError(f"the fps of its description, {shown(fps)}, cannot be")
+    size = told.get("size")
+    if size is not None and not (isinstance(size, list) and len(size) == 2):
+        raise ValueError("the size of its description is not [height, width]")
+    return content.replace(
+        size=None if size is None else size_of(f"{path}, its description", {"height": size[0], "width": size[1]}),
+        frames=None if frames is None else tuple(sorted(set(frames))),
+        fps=fps,
+        name=str(told.get("name", "")),
+    )
+
+
+_FASTEST = 1e6  # frames a second
 
 
 def _first_line(error: Exception) -> str:

@@ -14,6 +14,7 @@ from perdure.errors import FormatError
 from perdure.files.contours import wkt_of
 from perdure.files.formats.content import Content, Format, Gathering, Reading, counted_from_one
 from perdure.files.formats.traits import ALL, Trait
+from perdure.files.lines import four_digits, number_of
 from perdure.files.span import shown
 from perdure.files.whole import refuse_existing, whole_file
 from perdure.types import Ground, Outline, Status, Tracks
@@ -106,7 +107,7 @@ def _lines(rows: Tracks, on_ground: bool) -> Iterator[list[object]]:
             rows.ids[i],
             *(f"{side:.2f}" for side in rows.boxes[i]),
             Status(rows.status[i]).word,
-            f"{rows.confidence[i]:.4g}",
+            four_digits(rows.confidence[i]),
             rows.classes[i],
             rows.groups[i],
             int(rows.inferred[i]),
@@ -134,7 +135,7 @@ def _add(rows: Gathering, place: str, row: Mapping[str, str]) -> None:
     def number(name: str, default: float = 0.0) -> float:
         cell = row.get(name, "").strip()
         try:
-            return float(_YES_AND_NO.get(cell, cell)) if cell else default
+            return number_of(_YES_AND_NO.get(cell, cell)) if cell else default
         except ValueError:
             raise rows.refuse(place, f"{shown(cell)} in column {name!r} is no number") from None
 
