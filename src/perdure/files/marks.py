@@ -103,7 +103,7 @@ def _parted(text: str) -> tuple[str, Any]:
     if not at or is_file(text):
         return text, 0
     if re.fullmatch(r"[0-9]{1,9}", frame.strip()):
-        return what.strip(), int(frame)
+        return what.strip(), int(frame.strip())
     return (what, frame) if is_file(what) or "," in what else (text, 0)
 
 
