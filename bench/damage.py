@@ -117,13 +117,24 @@ def _harm(way: int, share: float, size: int, rng: random.Random) -> Harm:
     if way == 0:
         at = int(share * size)
         return Harm(f"cut at {at} of {size}", lambda content: content[:at])
-    ends = ((0, min(1024, size)), (max(0, size - 1024), size), (0, size), (0, size), (0, size), (0, min(1024, size)))
+    ends = (
+        (0, min(1024, size)),
+        (max(0, size - 1024), size),
+        (0, size),
+        (0, size),
+        (0, size),
+        (0, min(1024, size)),
+    )
     at = rng.randrange(*ends[rng.randrange(6)])
     if way == 1:
         bit = 1 << rng.randrange(8)
-        return Harm(f"bit {bit} at {at} of {size}", lambda content: _overwritten(content, at, bytes([content[at] ^ bit])))
+        return Harm(
+            f"bit {bit} at {at} of {size}", lambda content: _overwritten(content, at, bytes([content[at] ^ bit]))
+        )
     stretch = rng.randbytes(rng.randint(2, 64))
-    return Harm(f"{len(stretch)} bytes at {at} of {size}", lambda content: _overwritten(content, at, stretch)[:size])
+    return Harm(
+        f"{len(stretch)} bytes at {at} of {size}", lambda content: _overwritten(content, at, stretch)[:size]
+    )
 
 
 def _overwritten(content: bytes, at: int, by: bytes) -> bytes:

@@ -71,6 +71,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
         "VideoError",
         "DamagedVideo",
         "FormatError",
+        "DetectorError",
         "OutputError",
         "StateError",
     ),

@@ -17,6 +17,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from perdure.errors import (
         DamagedVideo,
+        DetectorError,
         FormatError,
         OutputError,
         ParameterError,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 _HOME = {
     "perdure.errors": [
         "DamagedVideo",
+        "DetectorError",
         "FormatError",
         "OutputError",
         "ParameterError",
@@ -53,6 +55,7 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 __all__ = [
     "DamagedVideo",
     "Detector",
+    "DetectorError",
     "Event",
     "FormatError",
     "Frame",

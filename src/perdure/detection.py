@@ -10,6 +10,7 @@ from typing import Any
 from perdure import params
 from perdure.detect import DETECTORS, Background, BoxMasks, Recorded
 from perdure.detect.box_masks import KINDS
+from perdure.detect.own import Own
 from perdure.errors import FormatError, ParameterError
 from perdure.files.networks import ENGINES, read_class_names, read_network
 from perdure.files.regions import read_regions
@@ -113,7 +114,7 @@ def made_detector(
     if box_masks is not None and box_masks not in KINDS:
         raise ParameterError(f"box_masks = {box_masks!r} is not known: it must be {' or '.join(KINDS)}")
     parts = [params.build(kind, _of_kind(kind, given)) for kind in kinds_of(name, box_masks)]
-    made: Any = parts[0] if name in DETECTORS else detector
+    made: Any = parts[0] if name in DETECTORS else _guarded(detector)
     if name == "recorded":
         made = dataclasses.replace(made, regions=read_regions(Path(str(detector))))
     elif name == "function":
@@ -131,8 +132,14 @@ def made_detector(
 
 
 def inner(detector: Any) -> Any:
-    """Return the detector that sees things, without what gives silhouettes to its boxes."""
-    return detector.detector if isinstance(detector, BoxMasks) else detector
+    """Return the detector that sees things, without what gives silhouettes to its boxes or looks at its answers."""
+    seeing = detector.detector if isinstance(detector, BoxMasks) else detector
+    return seeing.detector if isinstance(seeing, Own) else seeing
+
+
+def _guarded(detector: object) -> object:
+    """A detector of the caller's own with what looks at its answers; one of ours as it is."""
+    return detector if isinstance(detector, tuple(DETECTORS.values())) else Own(detector)
 
 
 def about(detector: Any, name: str) -> dict[str, Any]:

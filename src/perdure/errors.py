@@ -5,6 +5,7 @@ PerdureError
 │   └── DamagedVideo    a source that broke off: what came before it is good
 ├── FormatError         a file that is not what it should be (names file, line, reason)
 ├── ParameterError      a value out of its range, or a name that is not known
+├── DetectorError       a detector of the caller's own that failed (its exception is the cause)
 ├── OutputError         a place that cannot be written, or that holds something already
 └── StateError          a saved state of another version or another kind
 """
@@ -45,6 +46,22 @@ class FormatError(PerdureError):
 
 class ParameterError(PerdureError):
     """A value out of range, or a name that is not known."""
+
+
+class DetectorError(PerdureError):
+    """A detector of the caller's own that raised an exception, which is the cause of this one.
+
+    Parameters
+    ----------
+    message : str
+        Which detector, in which frame, where in its code, and what it raised.
+    index : int
+        Number of the frame, counted from 0; every frame before it was tracked.
+    """
+
+    def __init__(self, message: str, index: int) -> None:
+        super().__init__(message)
+        self.index = index
 
 
 class OutputError(PerdureError):

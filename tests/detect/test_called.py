@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import traceback
+from pathlib import Path
+
 import numpy as np
 import pytest
 import supervision
 from worlds import two_apart
 
 import perdure
+from perdure.cli.running import run
 from perdure.detect import Background, Called, Recorded
 from perdure.detect.components import components
-from perdure.errors import ParameterError
+from perdure.errors import DetectorError, ParameterError
+from perdure.files.runs import Reporting, RunFolder
 from perdure.types import Frame, Regions, Scene
 
 FILM = [frame.image for frame in two_apart().frames()]
@@ -86,11 +91,60 @@ def test_a_detector_may_be_given_as_it_is_and_needs_no_word():
     assert len(set(tracks.counted().ids.tolist())) == 2
 
 
-def test_what_a_function_itself_raises_is_the_users_to_see():
+def test_an_exception_in_a_function_tells_function_frame_and_line_and_is_the_cause():
     def broken(image):
-        raise ZeroDivisionError("in my detector")
+        seen.append(1 / (3 - len(seen)))
 
-    with pytest.raises(ZeroDivisionError, match="in my detector"):
-        perdure.track(FILM, detector=broken)
+    seen: list[float] = []
+    with pytest.raises(
+        DetectorError, match=r"broken' failed in frame 3 \(0.30 s\), in test_called.py, line \d+: Zero"
+    ) as told:
+        perdure.track(FILM, detector=broken, fps=10)
+    assert told.value.index == 3
+    assert isinstance(told.value.__cause__, ZeroDivisionError)
+    assert traceback.extract_tb(told.value.__cause__.__traceback__)[-1].name == "broken"
     with pytest.raises(ParameterError, match="detector=function"):
         Called().start(Scene(9, 9))
+
+
+def test_what_a_run_had_logged_before_a_function_failed_is_kept(tmp_path: Path):
+    def tired(image):
+        seen.append(image)
+        if len(seen) == 20:
+            raise MemoryError
+        return seen_in(image).boxes
+
+    seen: list[np.ndarray] = []
+    folder = RunFolder.create(tmp_path / "run", overwrite=False)
+    with pytest.raises(DetectorError, match="in frame 19"):
+        run(perdure.plan(FILM, detector=tired, fps=10), folder, Reporting(), film=False)
+    assert folder.read_about()["status"] == "failed"
+    assert RunFolder.open(folder.path).read()[2] == 19
+
+
+class Teller:
+    """A detector of one's own that answers what it is given."""
+
+    def __init__(self, answer: object) -> None:
+        self.answer = answer
+
+    def start(self, scene: Scene) -> object:
+        return None
+
+    def step(self, state: object, frame: Frame) -> object:
+        return self.answer(frame) if callable(self.answer) else self.answer
+
+
+@pytest.mark.parametrize("answer", [None, 7, (), (None, [[0, 0, 9, 9]]), (None, None), Regions.empty()])
+def test_an_object_that_answers_no_state_and_regions_is_told_what_it_should(answer):
+    with pytest.raises(ParameterError, match=r"'Teller' answered .* in frame 0; its step must return a pair"):
+        perdure.track(FILM, detector=Teller(answer))
+
+
+def test_an_exception_in_an_object_names_it_and_the_frame():
+    with pytest.raises(DetectorError, match=r"'Teller' failed in frame 0 .*ZeroDivisionError"):
+        perdure.track(FILM, detector=Teller(lambda frame: 1 / frame.index))
+    unready = Teller(None)
+    unready.start = lambda scene: {}["weights"]
+    with pytest.raises(DetectorError, match=r"'Teller' failed before the first frame.*KeyError: 'weights'"):
+        perdure.track(FILM, detector=unready)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from perdure.detect.own import failed, name_of
 from perdure.detect.plausible import MOST, MOST_HELP, centred_in, plausible, told
 from perdure.errors import ParameterError
 from perdure.params import parameter
@@ -56,12 +57,17 @@ class Called:
 
         Raises
         ------
+        DetectorError
+            If the function raises an exception, which is the cause.
         ParameterError
-            For an answer of a kind that is not known, naming the frame.
+            For an answer of a kind that is not known, naming the function and the frame.
         """
         if frame.image is None or self.function is None:
             return state, Regions.empty()
-        answer = self.function(frame.image)
+        try:
+            answer = self.function(frame.image)
+        except Exception as error:  # whatever the caller's code raises
+            raise failed(name_of(self.function), frame, error) from error
         if answer is None:
             return state, Regions.empty()
         try:
@@ -70,7 +76,7 @@ class Called:
             regions = given.regions(sifted.rows)
         except (ParameterError, ValueError) as error:
             raise ParameterError(
-                f"what the detector said of frame {frame.index} cannot be taken: {error}"
+                f"what the detector {name_of(self.function)} said of frame {frame.index} cannot be taken: {error}"
             ) from error
         regions = regions.take(np.flatnonzero(centred_in(regions.boxes, state.roi)))
         before = answer.events if isinstance(answer, Regions) else ()
