@@ -209,6 +209,7 @@ _ONNX_KINDS = {"tensor(float)": "float32", "tensor(float16)": "float16", "tensor
 def _open_openvino(place: Path, threads: int) -> _Opened:
     try:
         import openvino
+        from openvino.frontend import FrontEndManager
     except ImportError:
         raise ParameterError(f"the model {place} needs OpenVINO; pip install 'perdure[openvino]'") from None
     check_model_file(place, ".xml")
@@ -223,7 +224,8 @@ def _open_openvino(place: Path, threads: int) -> _Opened:
     core = openvino.Core()
     settings = {"INFERENCE_NUM_THREADS": threads, "INFERENCE_PRECISION_HINT": "f32", "NUM_STREAMS": 1}
     try:
-        model = core.read_model(str(place))
+        reader = FrontEndManager().load_by_framework(place.suffix.lower().strip(".").replace("xml", "ir"))
+        model = reader.convert(reader.load(str(place)))  # each other reader would say its part of a damaged file
         compiled = core.compile_model(model, "CPU", settings)
     except Exception as error:  # RuntimeError, or whatever a part of it throws
         raise FormatError(
