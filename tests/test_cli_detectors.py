@@ -15,6 +15,7 @@ from networks import network
 from test_cli import perdure, write_film
 from worlds import two_apart
 
+from perdure import pipeline
 from perdure.files.mot import read_tracks
 
 
@@ -60,6 +61,20 @@ def test_a_network_is_tracked_by_class_and_the_run_tells_what_it_was(at: Path):
     }  # fmt: skip
     events = (at / "wolves" / "events.csv").read_text()
     assert events.count("unusable") == 20
+
+
+def test_a_class_of_which_nothing_was_seen_is_told(at: Path):
+    answer = np.zeros((1, 300, 6), np.float32)
+    answer[0, 0] = [0.25, 0.25, 0.5, 0.75, 0.9, 3]
+    network(at / "numbers.onnx", {"out": answer})
+    for command in (("track", "-o", "none", "--no-video"), ("detect", "-o", "none.jsonl")):
+        done = perdure(*command, "walk.avi", "--detector", "onnx:numbers.onnx", "--class", 99, at=at)
+        assert done.returncode == 0, done.stderr
+        assert "no region was of class 99; without --class, `perdure detect` shows which" in done.stderr
+    assert "no region was of class" in json.loads((at / "none" / "run.json").read_text())["warnings"][-1]
+    film = [np.zeros((64, 64, 3), np.uint8)] * 3
+    with pytest.warns(RuntimeWarning, match="no region was of class 4 or 99"):
+        pipeline.track(film, detector=f"onnx:{at / 'numbers.onnx'}", classes=["4", "99"])
 
 
 def test_regions_of_a_network_with_silhouettes_are_written_to_a_file(at: Path):

@@ -134,6 +134,15 @@ class Plan:
         """Return what the user should know of the lines in his scenarios."""
         return () if self.rules is None else self.rules.outside(self.scene.width, self.scene.height)
 
+    def of_classes(self, regions: int) -> tuple[str, ...]:
+        """Return what the user should know about the wanted classes, of which there were so many regions in all."""
+        if not self.classes or regions or recorded(self.detector):
+            return ()
+        words = " or ".join(self.classes)
+        return (
+            f"no region was of class {words}; without --class, `perdure detect` shows which classes there are",
+        )
+
     def _of_ground(self) -> tuple[str, ...]:
         """What the user should know of the ground that was to be estimated."""
         if self.estimate is None:
@@ -408,14 +417,17 @@ def track(source: AnySource, **options: Any) -> Tracks:
     """
     made = plan(source, **_sorted_options(options))
     reports: list[Report] = []
+    regions = 0
     try:
         for step in made.prepared().steps():
             reports.append(step.report)
+            regions += len(step.regions)
     except DamagedVideo as damage:
         warnings.warn(str(damage), RuntimeWarning, stacklevel=2)
     finally:
         made.source.close()
-    for note in left_out(event for report in reports for event in report.events).notes:
+    unusable = left_out(event for report in reports for event in report.events)
+    for note in (*unusable.notes, *made.of_classes(regions)):
         warnings.warn(note, RuntimeWarning, stacklevel=2)
     return fold.settle(reports)
 

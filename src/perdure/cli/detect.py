@@ -72,7 +72,7 @@ def detect(
         watched_frames = ending.frames(watched(made.source, f"detecting in {made.source.name}", made.source.count))
         count = write_regions(output, counted(ending.first_look(made).seen(watched_frames)))
     made.source.close()
-    for warning in (*made.source.warnings, *unusable.notes):
+    for warning in (*made.source.warnings, *unusable.notes, *made.of_classes(count)):
         print(f"perdure: note: {warning}", file=sys.stderr)
     if json_:
         print(json.dumps({"status": ending.status, "output": str(output), "frames": frames, "regions": count}))

@@ -80,6 +80,7 @@ class _Running:
         unusable = left_out(step.regions.events, now.left_out)
         if frame is not None:
             self.frame, now = frame, replace(now, frames=now.frames + 1, frame=frame.index, time=frame.time)
+            now = replace(now, regions=now.regions + len(step.regions))
         if self.live is not None:
             self.live.tell(step)
         self.progress = replace(now, context=context, left_out=unusable)
@@ -170,6 +171,7 @@ def _tracked(
         warnings = (
             *made.source.warnings,
             *made.notes(),
+            *made.of_classes(running.progress.regions),
             *running.progress.left_out.notes,
             *checkpoints.notes,
         )

@@ -33,6 +33,7 @@ class Progress:
     frames: int = 0  # that were logged
     frame: int = -1  # number of the last
     time: float = 0.0  # s, of the last
+    regions: int = 0  # that were tracked
     context: str = ""  # that is in force
     left_out: LeftOut = field(default_factory=LeftOut)  # boxes of the detector
     lasting: tuple[Lasting, ...] = ()  # events that were told as begun
