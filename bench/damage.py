@@ -260,13 +260,13 @@ def pictures() -> list[NDArray[np.uint8]]:
     return drawn
 
 
-def coded(codec: str, suffix: str, **options: str) -> Callable[[Path], Path]:
+def coded(codec: str, suffix: str, muxing: dict[str, str] | None = None, **options: str) -> Callable[[Path], Path]:
     """What writes the film by a codec into the container that a suffix means."""
 
     def write(place: Path) -> Path:
         film = place.with_suffix(suffix)
         layout = {"mjpeg": "yuvj420p", "rawvideo": "bgr24", "ffv1": "yuv420p"}.get(codec, "yuv420p")
-        with av.open(str(film), "w") as container:
+        with av.open(str(film), "w", options=muxing or {}) as container:
             stream = container.add_stream(codec, rate=10, options=options)
             stream.width, stream.height, stream.pix_fmt = *_SIZE, layout
             stream.codec_context.gop_size, stream.bit_rate = 10, 1_000_000
@@ -303,7 +303,7 @@ def yuv4mpeg(place: Path) -> Path:
 
 KINDS: dict[str, Callable[[Path], Path]] = {
     "mp4-h264": coded("libx264", ".mp4"),
-    "mp4-mpeg4": coded("mpeg4", ".mp4"),
+    "mp4-first": coded("libx264", ".mp4", {"movflags": "+faststart"}),
     "mov-mjpeg": coded("mjpeg", ".mov"),
     "mkv-h264": coded("libx264", ".mkv"),
     "mkv-ffv1": coded("ffv1", ".mkv", slicecrc="1", level="3"),

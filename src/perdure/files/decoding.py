@@ -293,7 +293,7 @@ class _Extent:
     def cut(self) -> bool:
         """Return whether the file ends clearly before its header says; asked at its end."""
         if "matroska" in self.format:
-            own = _seconds(self.stream.metadata.get("DURATION", ""))
+            own = seconds_of_tag(self.stream.metadata.get("DURATION", ""))
             return own - self.end > 3.0 / float(self.stream.average_rate or 3) or self.length - self.end > _LATE
         declared = self.stream.frames
         if "mov" in self.format:  # an edit list may leave out samples that its header counts
@@ -301,8 +301,8 @@ class _Extent:
         return declared - self.packets > max(2, declared // 200)
 
 
-def _seconds(text: str) -> float:
-    """The seconds of a Matroska duration '00:00:02.400000000'; 0 where it is none."""
+def seconds_of_tag(text: str) -> float:
+    """Return the seconds of a Matroska duration '00:00:02.400000000'; 0 where it is none."""
     match = re.fullmatch(r"(\d+):(\d+):(\d+(?:\.\d+)?)", text)
     return int(match[1]) * 3600 + int(match[2]) * 60 + float(match[3]) if match else 0.0
 

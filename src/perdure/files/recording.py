@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import weakref
 from bisect import bisect_left
 from collections.abc import Generator, Iterator
@@ -16,9 +17,11 @@ from av.video.stream import VideoStream
 from perdure.errors import DamagedVideo, ParameterError, VideoError
 from perdure.files.ahead import ahead
 from perdure.files.clock import Clock
+from perdure.files.cut_short import cut_short
 from perdure.files.decoding import Broken, Listing, Picture, can_enter, decode, list_frames, rgb
 from perdure.files.refusal import opened, video_stream
 from perdure.files.span import Span, no_frame
+from perdure.files.tally import Promise, Tally, promise_of
 from perdure.types import Bits, Frame, Image, Scene
 
 _RATE = 25.0  # frames per second, where a file says none
@@ -43,6 +46,7 @@ class Recording:
     total: int | None
     count: int | None
     listing: Listing | None
+    promise: Promise = field(default_factory=Promise)
     warnings: list[str] = field(default_factory=list)
     rereadable: bool = True
     has_images: bool = True
@@ -125,13 +129,14 @@ class Recording:
 
     def _frames(self, after: int) -> Generator[Frame, None, None]:
         """The wanted frames behind one; DamagedVideo at the first damage, after every frame before it."""
-        clock = self._clock()
+        clock, tally = self._clock(), Tally()
         begin: int | None = None
         upcoming = 0
         try:
             for picture in decode(self.path, key=self._key(), listing=self.listing):
                 time = clock.time(picture.index, picture.seconds)
                 upcoming = picture.index + 1
+                tally.note(picture.index, picture.seconds)
                 if self.span.passed(picture.index, time):
                     return
                 if not self.span.reached(picture.index, time):
@@ -143,6 +148,9 @@ class Recording:
             raise self._damaged(upcoming, clock.next_time) from None
         if begin is None and self.span.start is not None:
             raise VideoError(too_late(self.span, self.path, clock.last or 0.0))
+        if self.listing is None:  # all of it was wanted
+            told = tally.notes(self.promise, cut_short(self.path))
+            self.warnings.extend(note for note in told if note not in self.warnings)
 
     def _damaged(self, index: int, time: float) -> DamagedVideo:
         of = f" of {self.total}" if self.total and self.total > index else ""
@@ -232,8 +240,14 @@ def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
     with opened(path) as container:
         stream = video_stream(path, container)
         rate = _rate(stream, warnings)
+        promise = promise_of(container, stream)
+        timed = stream.start_time is not None and container.format.name != "avi"
+        begin = float((stream.start_time or 0) * (stream.time_base or 0)) if timed else math.inf
         total = stream.frames or round((container.duration or 0) / av.time_base * rate) or None
     first = first_picture(path)
+    early = 0 if first.seconds is None else round(max(0.0, first.seconds - begin) * rate)
+    if early > 1:  # 1 may be a matter of rounding
+        warnings.append(f"{early} frames are missing before the first that can be decoded")
     turns = round(first.frame.rotation / 90) % 4
     if turns:
         warnings.append(f"rotated by {90 * turns}° counter-clockwise, as its metadata says")
@@ -263,6 +277,7 @@ def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
         total=total,
         count=count,
         listing=listing,
+        promise=promise,
         warnings=warnings,
     )
 

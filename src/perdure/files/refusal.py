@@ -60,7 +60,7 @@ def video_stream(path: Path, container: InputContainer) -> VideoStream:
 def _why_not(path: Path, head: bytes, error: av.error.FFmpegError) -> str:
     if head[4:8] in _BOXES and _lacks_index(path):
         return _NO_INDEX.format(path)
-    if b"\0" not in head:
+    if b"\0" not in head and not head.startswith(b"YUV4MPEG2 "):
         return f"{path} is not a video but text"
     return f"{path} is not a video that can be read ({error.strerror or error})"
 
