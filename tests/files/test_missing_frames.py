@@ -90,7 +90,16 @@ def test_a_film_that_begins_within_a_group_of_pictures_says_what_cannot_be_decod
     source = open_source(torn)
     frames = list(source)
     assert len(frames) == 30
-    assert "frames are missing before the first that can be decoded" in source.warnings[0]
+    assert "those before it are missing, or cannot be decoded" in source.warnings[0]
+
+
+def test_a_matroska_film_whose_first_packets_are_lost_says_when_it_begins(tmp_path: Path):
+    film = damage.coded("mjpeg", ".mkv")(tmp_path / "film")
+    source = open_source(without(tmp_path / "torn.mkv", lambda number: number < 6, film))
+    assert len(list(source)) == damage.FRAMES - 6
+    assert list(source.warnings) == [
+        "its first frame is at 0.60 s: those before it are missing, or cannot be decoded"
+    ]
 
 
 def tally(times: list[float]) -> Tally:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from perdure.errors import DamagedVideo, ParameterError, VideoError
@@ -26,6 +27,7 @@ from perdure.types import Bits, Frame, Image, Scene
 
 _RATE = 25.0  # frames per second, where a file says none
 _SHORT = 1500 * 768 * 576  # pixels: a recording up to this is decoded straight through for a first look
+_OUT_OF_ORDER = 4  # frames that a decoder may have to wait for
 _FURTHER = 48  # frames decoded after a key frame, at most, for a first look
 
 
@@ -241,13 +243,12 @@ def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
         stream = video_stream(path, container)
         rate = _rate(stream, warnings)
         promise = promise_of(container, stream)
-        timed = stream.start_time is not None and container.format.name != "avi"
-        begin = float((stream.start_time or 0) * (stream.time_base or 0)) if timed else math.inf
+        begin = _beginning(container, stream)
         total = stream.frames or round((container.duration or 0) / av.time_base * rate) or None
     first = first_picture(path)
-    early = 0 if first.seconds is None else round(max(0.0, first.seconds - begin) * rate)
-    if early > 1:  # 1 may be a matter of rounding
-        warnings.append(f"{early} frames are missing before the first that can be decoded")
+    if first.seconds is not None and (first.seconds - begin) * rate > 1.5:
+        when = f"its first frame is at {first.seconds:.2f} s"
+        warnings.append(f"{when}: those before it are missing, or cannot be decoded")
     turns = round(first.frame.rotation / 90) % 4
     if turns:
         warnings.append(f"rotated by {90 * turns}° counter-clockwise, as its metadata says")
@@ -280,6 +281,15 @@ def open_recording(path: Path, fps: float | None, span: Span) -> Recording:
         promise=promise,
         warnings=warnings,
     )
+
+
+def _beginning(container: InputContainer, stream: VideoStream) -> float:
+    """At what second a file begins: at its first packet, a Matroska at 0 but for frames that are shown out of order."""
+    if container.format.name == "avi" or stream.start_time is None:  # an AVI has no timestamps
+        return math.inf
+    begin = float(stream.start_time * (stream.time_base or 0))
+    late = _OUT_OF_ORDER / float(stream.average_rate or _RATE)
+    return min(begin, late) if "matroska" in container.format.name else begin
 
 
 def first_picture(path: Path) -> Picture:
