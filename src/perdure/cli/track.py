@@ -12,6 +12,7 @@ import typer
 from perdure import params
 from perdure.cli import options
 from perdure.cli.resuming import EVERY, found, is_finished
+from perdure.cli.rolled import run_rolled
 from perdure.cli.running import asked, finished, run, show
 from perdure.detect import DETECTORS
 from perdure.detection import file_of
@@ -98,6 +99,18 @@ def track(
             help="How often it is put down where a run stands; more seldom where that takes long.",
         ),
     ] = EVERY,
+    roll: Annotated[
+        str | None,
+        typer.Option(
+            "--roll",
+            metavar="TIME",
+            help="For a camera or a URL: run folders in DIR, of which the clock begins a new one every so often: '1h'.",
+            show_default=False,
+        ),
+    ] = None,
+    keep: Annotated[
+        int, typer.Option("--keep", metavar="N", min=0, help="With --roll, how many finished folders; 0 for all.")
+    ] = 0,
     json_: options.JsonOption = False,
 ) -> None:
     """Track every moving thing in SOURCE into a run folder."""
@@ -107,6 +120,12 @@ def track(
         raise ParameterError("--events - and --json both write to stdout; leave out one of them")
     if resume and overwrite:
         raise ParameterError("--resume goes on with a run and --overwrite replaces it; leave out one of them")
+    if roll is not None and (resume or overwrite):
+        raise ParameterError(
+            "--roll writes new folders beside those that are there; leave out --resume and --overwrite"
+        )
+    if keep and roll is None:
+        raise ParameterError("--keep goes with --roll; leave it out")
     given = options.read_parameters(parameters, chosen)
     reporting = params.build(
         Reporting, {name: given.pop(name) for name in list(given) if name == "report_confidence"}
@@ -151,6 +170,10 @@ def track(
     inputs = [Path(one) for one in (*read.values(), *also) if one is not None and is_file(one)]
     digests = {name: digest(Path(one)) for name, one in read.items() if one is not None and is_file(one)}
     place = output or Path("perdure-runs") / made.source.name
+    told = LiveEvents(lines_to(sys.stdout)) if events else None
+    if roll is not None:
+        run_rolled(made, place, reporting, roll, keep, window=window, inputs=digests, live=told, as_json=json_)
+        return
     try:
         earlier = found(made, place, asked(made, reporting, window, digests)) if resume else None
         folder = earlier or RunFolder.create(place, overwrite=overwrite, inputs=inputs)
@@ -167,7 +190,7 @@ def track(
             window=window,
             inputs=digests,
             film=not no_video,
-            live=LiveEvents(lines_to(sys.stdout)) if events else None,
+            live=told,
             resume=earlier is not None,
             every=checkpoint_every,
         )

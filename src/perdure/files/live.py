@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _PATIENCE = 10.0  # s without an answer
 _RATE = 25.0
+_LOST = "frames are missing: what was damaged on the way is left out"
 _NO_SEEKING = "; if it is an mp4, its index may be at its end: download it first"
 
 
@@ -43,7 +44,7 @@ def open_url(url: str, fps: float | None, span: Span, silence: float = _PATIENCE
     stream.thread_type = "AUTO"
     rate = fps or float(stream.average_rate or stream.guessed_rate or _RATE)
     warnings: list[str] = []
-    shots = _stream_shots(container, stream)
+    shots = _stream_shots(container, stream, warnings)
     clock = Clock(rate, warnings, fixed=fps)
     name = urlsplit(url).hostname or "stream"
     try:
@@ -90,18 +91,22 @@ def _camera_shots(camera: cv2.VideoCapture) -> Iterator[Shot]:
         yield Shot(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8), time.monotonic())
 
 
-def _stream_shots(container: av.container.InputContainer, stream: av.VideoStream) -> Iterator[Shot]:
-    """Pictures of a stream; damaged ones are left out."""
+def _stream_shots(
+    container: av.container.InputContainer, stream: av.VideoStream, warnings: list[str]
+) -> Iterator[Shot]:
+    """Pictures of a stream; damaged ones are left out, and the first time that is said."""
     tick = float(stream.time_base or 0)
     hint = _NO_SEEKING if "mp4" in container.format.name else ""
     try:
         for packet in container.demux(stream):
             try:
-                frames = packet.decode()
+                frames: list[object] = list(packet.decode())
             except av.error.InvalidDataError:
-                continue  # lost on the way
+                frames = [None]
             for frame in frames:
-                if isinstance(frame, av.VideoFrame) and not frame.is_corrupt:
+                if not isinstance(frame, av.VideoFrame) or frame.is_corrupt:
+                    warnings.extend([] if _LOST in warnings else [_LOST])
+                else:
                     seconds = None if frame.pts is None else frame.pts * tick
                     yield Shot(rgb(frame), seconds)
                     hint = ""  # what gave a picture can be read in its order
