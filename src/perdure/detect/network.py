@@ -14,7 +14,7 @@ from perdure.detect.layouts import Found, Layout
 from perdure.detect.letterbox import Fit
 from perdure.detect.plausible import MOST, MOST_HELP, centred_in, plausible, surest, told
 from perdure.detect.suppression import one_each
-from perdure.errors import ParameterError
+from perdure.errors import DetectorError, ParameterError
 from perdure.params import parameter
 from perdure.types import Bits, Frame, Regions, Scene
 
@@ -91,11 +91,25 @@ class Network:
         return NetworkState(scene.roi)
 
     def step(self, state: NetworkState, frame: Frame) -> tuple[NetworkState, Regions]:
-        """Return what the network sees in one picture, and an event for boxes that cannot be."""
+        """Return what the network sees in one picture, and an event for boxes that cannot be.
+
+        Raises
+        ------
+        DetectorError
+            If the network fails, or answers something else than it did at first.
+        """
         if frame.image is None or self.model is None:
             return state, Regions.empty()
         layout = self.model.layout
-        found = layout.decode(self.model.run(layout.fit.fitted(frame.image)))
+        try:
+            found = layout.decode(self.model.run(layout.fit.fitted(frame.image)))
+        except Exception as error:  # an engine's own, or of outputs that have another shape now
+            said = " ".join(f"{type(error).__name__}: {error}".split())
+            raise DetectorError(
+                f"the network {self.model.name} failed in frame {frame.index} ({frame.time:.2f} s): {said:.200}; its outputs "
+                "must keep one layout: export it with fixed sizes",
+                frame.index,
+            ) from error
         found = _taken(
             found, np.flatnonzero(~(found.scores < self.network_score))
         )  # what is no number stays, to be told

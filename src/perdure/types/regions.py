@@ -53,6 +53,11 @@ class Regions:
         object.__setattr__(self, "masks", tuple(self.masks))
         check_lengths(len(self.boxes), {"scores": self.scores, "classes": self.classes, "masks": self.masks})
         check_lengths(len(self.boxes), self.data)
+        if self.scores.ndim != 1 or self.classes.ndim != 1:
+            raise ValueError(f"scores and classes must be (N,), not {self.scores.shape} and {self.classes.shape}")
+        if not all(isinstance(mask, Mask) for mask in self.masks):
+            raise ValueError("a region's mask must be a perdure.Mask; Mask.of_image makes one of a bool picture")
+        _check_marks(self.data.get("mark"), len(self.boxes))
         if not (self.boxes[:, :2] <= self.boxes[:, 2:]).all():
             raise ValueError("a region's box must have x1 ≤ x2 and y1 ≤ y2")
         if (np.abs(self.boxes) > FARTHEST).any():
@@ -108,3 +113,12 @@ class Regions:
         """Return whether both say the same, `data` apart."""
         said = self.events == other.events and self.blind == other.blind
         return said and same_columns(self, other, ("boxes", "scores", "classes", "masks"))
+
+
+def _check_marks(marks: Any, count: int) -> None:
+    """Refuse ids of marks that are none."""
+    if marks is None:
+        return
+    ids = np.asarray(marks)
+    if ids.shape != (count,) or not np.issubdtype(ids.dtype, np.integer) or (ids < 0).any():
+        raise ValueError("data['mark'] must be (N,) whole numbers from 0 on, 0 for what nobody marked")
