@@ -121,7 +121,7 @@ def test_a_run_is_converted_with_the_rows_that_count(perdure_says: Callable[...,
     assert perdure_says("convert", "run", "a.json", "--to", "coco-vis").code == 0
     found = read(Path("a.json"), recognised(Path("a.json")))
     assert found.tracks.ids.tolist() == [1, 2, 1, 2]  # neither the group nor the lost one
-    assert (found.name, found.size, found.frames) == ("yard", (HEIGHT, WIDTH), (0, 1, 2, 3, 4))
+    assert (found.name, found.size, tuple(found.frames)) == ("yard", (HEIGHT, WIDTH), (0, 1, 2, 3, 4))
     assert found.tracks.masks[0] == RING
     assert perdure_says("convert", "run/tracks.jsonl", "b.json", "--to", "coco-vis").code == 0
     assert Path("b.json").read_bytes() == Path("a.json").read_bytes()

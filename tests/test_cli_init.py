@@ -169,8 +169,11 @@ def test_frames_of_marks_are_the_sources_own_after_a_start(track):
         (["--init", "empty.png"], "the mask is empty"),
         (["--init", "full.png"], "covers 100.0 %"),
         (["--init", "both.png@10", "--detector", "nan.txt"], "nan.txt, line 1"),
-        (["--init", "both.png@10", "--detector", "nan.jsonl"], "nan.jsonl, line 2: a box must be finite"),
-        (["--init", "both.png@10", "--detector", "score.jsonl"], "score.jsonl, line 2: scores must be numbers"),
+        (["--init", "both.png@10", "--detector", "nan.jsonl"], "nan.jsonl, line 2: not JSON (NaN is not a number"),
+        (
+            ["--init", "both.png@10", "--detector", "score.jsonl"],
+            "score.jsonl, line 2: not JSON (NaN is not a number",
+        ),
         (["--init", "nan,10,20,30"], "it is no file, no box and no polygon"),
         (["--init", "both.png@10", "--trust", "nan"], "trust = nan is out of range"),
         (["--init", "both.png@40"], "frame 40 is not among those that are tracked, 0 to 39"),

@@ -357,7 +357,7 @@ def test_a_sequence_of_motchallenge_brings_its_size_and_rate(tmp_path: Path):
     told = "name=MOT-1\nimDir=img1\nframeRate=10\nseqLength=5\nimWidth=640\nimHeight=480\nimExt=.jpg\n"
     (tmp_path / "seqinfo.ini").write_text(f"[Sequence]\n{told}")
     found = read(tmp_path, recognised(tmp_path))
-    assert (found.size, found.fps, found.frames) == ((480, 640), 10, (0, 1, 2, 3, 4))
+    assert (found.size, found.fps, tuple(found.frames)) == ((480, 640), 10, (0, 1, 2, 3, 4))
     assert found.tracks.times.tolist() == [0, 0.1]
     assert found.tracks.classes.tolist() == ["pedestrian", "distractor"]
     assert found.notes == (
