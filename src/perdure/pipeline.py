@@ -68,6 +68,7 @@ class Plan:
     contexts: tuple[str, ...] = ()  # that the user named, in words
     rules: Rules | None = None  # scenarios that are to be recognised
     feedback: Feedback = dataclasses.field(default_factory=Feedback)  # and what they do to tracks
+    whole: Source | None = None  # over which first looks are taken, where the source is a part of it
 
     def check(self) -> None:
         """Refuse a detector, tracker and source that do not go together."""
@@ -100,7 +101,7 @@ class Plan:
         begin: list[float] = []
 
         def early() -> Iterator[Frame]:
-            for frame in self.source:
+            for frame in self.whole or self.source:
                 begin.append(frame.time)
                 if frame.time - begin[0] > LOOKED:
                     return
@@ -122,7 +123,7 @@ class Plan:
         """The plan with the detector's first look taken, where it and the source allow it."""
         if not (self.source.rereadable and self.source.has_images and hasattr(self.detector, "prepare")):
             return self
-        looked = self.detector.prepare(self.source.sample(FIRST_LOOKS))
+        looked = self.detector.prepare((self.whole or self.source).sample(FIRST_LOOKS))
         return dataclasses.replace(self, detector=looked)
 
     def notes(self) -> tuple[str, ...]:

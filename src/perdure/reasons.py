@@ -17,7 +17,7 @@ from perdure.files.log import Entry
 from perdure.fold import Corrections, coherent, settle_with
 from perdure.types import Event, Explanation, Renamed, Report, Status, Tracks
 
-DECIDING = ("exchanged", "found_again", "mended", "resolved")  # kinds of events that say whose an id is
+DECIDING = ("exchanged", "found_again", "joined", "mended", "resolved")  # kinds of events that say whose an id is
 
 
 class Share(NamedTuple):

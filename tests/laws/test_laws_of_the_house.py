@@ -23,7 +23,7 @@ HOUSE = Path(perdure.__file__).parent
 FLOORS = {
     "types": 0, "params": 0, "errors": 0, "states": 0,
     "maths": 1, "features": 2, "scene": 2, "detect": 3, "trackers": 3,
-    "fold": 4, "interpret": 4, "learn": 4, "metrics": 4, "files": 4, "draw": 4, "demo": 4,
+    "fold": 4, "interpret": 4, "learn": 4, "metrics": 4, "files": 4, "draw": 4, "demo": 4, "looks": 4, "stitching": 4,
     "live": 5, "pipeline": 5, "online": 5, "equipment": 5, "detection": 5, "foreign": 5, "owners": 5, "reasons": 5, "comparison": 5, "cluster": 5, "consistency": 5, "tuning": 5, "web": 5, "cli": 5, "__init__": 5, "__main__": 5,
 }  # fmt: skip
 

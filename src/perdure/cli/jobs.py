@@ -10,17 +10,19 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from perdure import __version__, params
-from perdure.cli.running import run
+from perdure.cli.parts import run_part, stitch_parts
+from perdure.cli.running import Outcome, run
 from perdure.detection import file_of
 from perdure.errors import FormatError, PerdureError
 from perdure.files.runs import Reporting, RunFolder
 from perdure.files.shapes import is_file
+from perdure.files.video import open_source
 from perdure.files.whole import cannot_write
 from perdure.pipeline import plan
 
@@ -43,12 +45,18 @@ class Job:
         Values of `Reporting` that were given.
     film : bool
         Whether `tracked.mp4` is drawn.
+    chunks : tuple of (int, int)
+        Spans of frames, each a job of its own, whose tracks are stitched; empty for a source that is tracked in one go.
+    within : mapping or None
+        Of such a part: `start` and `end` of the whole, over which first looks are taken.
     """
 
     source: str
     settings: Mapping[str, Any]
     reporting: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     film: bool = False
+    chunks: tuple[tuple[int, int], ...] = ()
+    within: Mapping[str, Any] | None = None
 
     @property
     def name(self) -> str:
@@ -68,6 +76,8 @@ class Job:
             "files": [_digest(one) for one in self.files],
             "reporting": self.reporting,
             "film": self.film,
+            **({"chunks": self.chunks} if self.chunks else {}),
+            **({"within": self.within} if self.within is not None else {}),
         }
         return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()[:12]
 
@@ -75,6 +85,13 @@ class Job:
     def files(self) -> list[Path]:
         """The files that the settings name."""
         return [Path(word) for word in _words(self.settings) if is_file(word)]
+
+    @property
+    def parts(self) -> list[Job]:
+        """The jobs that its chunks are."""
+        within = {name: self.settings[name] for name in ("start", "end") if name in self.settings}
+        spans = ({**self.settings, "start": f"{first}f", "end": f"{behind}f"} for first, behind in self.chunks)
+        return [Job(self.source, own, self.reporting, within=within) for own in spans]
 
 
 def placed(job: Job, into: Path) -> Path:
@@ -94,10 +111,17 @@ def finished(folder: Path) -> dict[str, Any] | None:
 def work_here(task: tuple[Job, Path]) -> dict[str, Any]:
     """Do a job into its folder, which appears whole or not at all; return what is to be told of it."""
     job, folder = task
+    with whole_folder(folder) as part:
+        return _done(job, RunFolder.create(part, overwrite=True, inputs=_inputs(job)))
+
+
+@contextlib.contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Have a hidden folder that takes its name when all in it is written, in place of a run that is there."""
     part = folder.with_name(f".{folder.name}.part")
     discard(folder)
     try:
-        told = _done(job, RunFolder.create(part, overwrite=True, inputs=_inputs(job)))
+        yield part
         if folder.exists():
             RunFolder.create(folder, overwrite=True).discard()
         os.replace(part, folder)
@@ -105,7 +129,6 @@ def work_here(task: tuple[Job, Path]) -> dict[str, Any]:
         raise cannot_write(folder, error) from error
     finally:
         discard(folder)
-    return told
 
 
 def discard(folder: Path) -> None:
@@ -124,27 +147,53 @@ def work_away(task: tuple[Job, Path]) -> tuple[dict[str, Any], dict[str, bytes]]
 
 def bring(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write the files of a run that was done elsewhere into its folder, whole or not at all."""
-    part = folder.with_name(f".{folder.name}.part")
-    discard(folder)
-    try:
+    with whole_folder(folder) as part:
         part.mkdir(parents=True)
         for name, content in files.items():
             (part / name).write_bytes(content)
-        if folder.exists():
-            RunFolder.create(folder, overwrite=True).discard()
-        os.replace(part, folder)
-    except OSError as error:
-        raise cannot_write(folder, error) from error
 
 
 def _done(job: Job, folder: RunFolder) -> dict[str, Any]:
     """Run a job into a folder; whatever is printed meanwhile is nobody's to read."""
     reporting = params.build(Reporting, job.reporting)
-    window = {name: job.settings[name] for name in _WINDOW if job.settings.get(name) is not None}
     with contextlib.redirect_stderr(io.StringIO()):
-        outcome = run(plan(job.source, **job.settings), folder, reporting, window=window, film=job.film)
+        made = plan(job.source, **job.settings)
+        if job.within is None:
+            outcome = run(made, folder, reporting, window=window_of(job), film=job.film)
+        else:
+            with contextlib.closing(open_source(job.source, fps=job.settings.get("fps"), **job.within)) as whole:
+                outcome = run_part(made, folder, reporting, window_of(job), whole)
     if outcome.status == "interrupted":
         raise PerdureError("interrupted")
+    return told_of(outcome)
+
+
+def stitch_here(task: tuple[Job, Path]) -> dict[str, Any]:
+    """Make the run of a job out of those of its chunks, which are there and then are no more."""
+    job, folder = task
+    reporting = params.build(Reporting, job.reporting)
+    spans = zip((placed(part, chunks_of(folder)) for part in job.parts), job.chunks, strict=True)
+    with contextlib.redirect_stderr(io.StringIO()), whole_folder(folder) as part:
+        made = plan(job.source, **job.settings)
+        into = RunFolder.create(part, overwrite=True, inputs=_inputs(job))
+        with contextlib.closing(made.source):
+            outcome = stitch_parts(made, into, reporting, window_of(job), list(spans), film=job.film)
+    shutil.rmtree(chunks_of(folder), ignore_errors=True)
+    return told_of(outcome)
+
+
+def chunks_of(folder: Path) -> Path:
+    """Return where the runs of a job's chunks are until they are stitched."""
+    return folder.with_name(f".{folder.name}.chunks")
+
+
+def window_of(job: Job) -> dict[str, Any]:
+    """Return for `run.json` which part of its source a job is of, and what it knows of the place."""
+    return {name: job.settings[name] for name in _WINDOW if job.settings.get(name) is not None}
+
+
+def told_of(outcome: Outcome) -> dict[str, Any]:
+    """Return what is to be told of a job that has ended."""
     return {
         "status": outcome.status,
         "message": outcome.message,

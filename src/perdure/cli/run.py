@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import json
 import os
-import signal
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, Any, Optional
 
 import typer
@@ -18,26 +16,18 @@ from typer.core import TyperCommand
 
 from perdure import cluster, params
 from perdure.cli import options
-from perdure.cli.jobs import (
-    Job,
-    bring,
-    discard,
-    finished,
-    name_of_source,
-    placed,
-    told_apart,
-    work_away,
-    work_here,
-)
-from perdure.cli.progress import watched
+from perdure.cli.doing import do
+from perdure.cli.jobs import Job, name_of_source, placed, told_apart
+from perdure.cli.parts import OVERLAP, Chunks
 from perdure.cli.spreading import spread
-from perdure.cli.summary import COUNTS, Row, code_of, page, value_of
-from perdure.cluster import Ended, Where
+from perdure.cli.summary import Row, code_of, page, value_of
+from perdure.cluster import Where
 from perdure.detect import DETECTORS
-from perdure.errors import FormatError, ParameterError, PerdureError, VideoError
+from perdure.errors import FormatError, ParameterError, VideoError
 from perdure.files.runs import Reporting
 from perdure.files.scored import find_truths, paired
 from perdure.files.shapes import is_file
+from perdure.files.video import open_source
 from perdure.interpret import Feedback
 from perdure.pipeline import plan
 from perdure.trackers import TRACKERS
@@ -134,6 +124,24 @@ def run(
     end: options.EndOption = None,
     stride: options.StrideOption = 1,
     parameters: options.ParametersOption = None,
+    chunks: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--chunks",
+            metavar="LENGTH",
+            help="Cut sources into parts of this length, seconds, mm:ss or 3000f, each a job; their tracks are stitched.",
+            show_default=False,
+        ),
+    ] = None,
+    overlap: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--overlap",
+            metavar="LENGTH",
+            help=f"How much of the part before it a part sees, too (default: {OVERLAP:g} s, or half a short part).",
+            show_default=False,
+        ),
+    ] = None,
     video: Annotated[bool, typer.Option("--video", help="Draw tracked.mp4 for each job.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Do anew what was done before.")] = False,
     json_: options.JsonOption = False,
@@ -163,13 +171,14 @@ def run(
         "parameters": given,
     }
     kinds = [(one, other) for one in tracker or (None,) for other in detector or (None,)]
-    jobs = _jobs(sources, kinds, settings, reporting, video)
+    cutting = _cutting(chunks, overlap, settings)
+    jobs = [_cut(job, cutting) for job in _jobs(sources, kinds, settings, reporting, video)]
     truths = truths_of(sources, truth or [])
     if truths and stride != 1:
         raise ParameterError("--truth and --stride: what is true of frames left out would count as missed")
     _check(jobs[0])
     rows = [Row(job, placed(job, output), label) for job, label in zip(jobs, _labels(jobs), strict=True)]
-    _do(rows, where, workers, attempts, overwrite=overwrite)
+    do(rows, where, workers, attempts, overwrite=overwrite)
     for row in rows:
         if truths and row.told:
             row.score(truths[row.job.source], windowed=start is not None or end is not None)
@@ -257,65 +266,39 @@ def _labels(jobs: Sequence[Job]) -> list[str]:
     return [" ".join(filter(None, words)) for words in zip(*parts, strict=True)]
 
 
+def _cutting(chunks: str | None, overlap: str | None, settings: Mapping[str, Any]) -> Chunks | None:
+    """How sources are cut; None where they are not."""
+    if chunks is None:
+        if overlap is not None:
+            raise ParameterError("--overlap goes with --chunks LENGTH; leave it out")
+        return None
+    if settings["scenarios"] is not None:
+        raise ParameterError(
+            "--scenarios and --chunks: what is done may begin in one chunk and end in the next; leave out --scenarios, "
+            "and run `perdure scenarios RUN` over the stitched run"
+        )
+    if settings["init"] is not None:
+        raise ParameterError(
+            "--init and --chunks: what is marked is known in one chunk alone; leave out one of the two"
+        )
+    return Chunks.of(chunks, overlap)
+
+
+def _cut(job: Job, cutting: Chunks | None) -> Job:
+    """The job in chunks, if its source is long enough; what cannot be opened tells that itself when its turn comes."""
+    if cutting is None:
+        return job
+    window = {name: job.settings[name] for name in ("fps", "start", "end", "stride") if name in job.settings}
+    try:
+        source = open_source(job.source, **window)
+    except (VideoError, FormatError):
+        return job
+    with contextlib.closing(source):
+        return dataclasses.replace(job, chunks=cutting.cut(source, window["stride"]))
+
+
 def _check(job: Job) -> None:
     """Find a mistake in what all jobs share before the first begins; what is wrong with one source alone, it tells itself."""
     params.build(Reporting, job.reporting)
     with contextlib.suppress(VideoError, FormatError):
         plan(job.source, **job.settings).source.close()
-
-
-def _do(rows: Sequence[Row], where: Where, workers: int | None, attempts: int, *, overwrite: bool) -> None:
-    """Do all jobs that are not done, and note what came of each."""
-    for row in rows:
-        if not overwrite and (about := finished(row.folder)) is not None:
-            row.told, row.before = {key: about[key] for key in ("status", *COUNTS) if key in about}, True
-            row.told["message"], row.told["warnings"] = about.get("message", ""), about.get("warnings", [])
-    left = [row for row in rows if row.told is None]
-    tasks = [(row.job, row.folder) for row in left]
-    here = where.kind == cluster.LOCAL
-    work: Callable[[tuple[Job, Path]], Any] = work_here if here else work_away
-    ends: Iterator[Ended[Any]] = cluster.work_at(tasks, work, on=where, workers=workers, attempts=attempts)
-    try:
-        with stoppable():
-            for ended in watched(ends, "runs", len(tasks), unit="runs"):
-                _note(left[ended.place], ended)
-                if not sys.stderr.isatty():
-                    print(f"perdure: {left[ended.place].label}: {left[ended.place].word}", file=sys.stderr)
-    except KeyboardInterrupt:
-        done = sum(row.told is not None for row in rows)
-        print(f"perdure: {done} of {len(rows)} jobs are done; the same command goes on", file=sys.stderr)
-        raise
-    finally:
-        for row in left:
-            discard(row.folder)
-
-
-def _note(row: Row, ended: Ended[Any]) -> None:
-    """Note what came of a job; what was done elsewhere is written here."""
-    row.failure, row.defect = ended.failure, ended.defect
-    if ended.value is None:
-        return
-    if isinstance(ended.value, tuple):
-        told, files = ended.value
-        try:
-            bring(row.folder, files)
-        except PerdureError as error:
-            row.failure = str(error)
-            return
-        row.told = told
-    else:
-        row.told = ended.value
-
-
-@contextlib.contextmanager
-def stoppable() -> Iterator[None]:
-    """Within the context a termination signal ends all as Ctrl-C does: no worker is left behind."""
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

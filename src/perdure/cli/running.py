@@ -8,7 +8,7 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -66,6 +66,7 @@ class _Running:
     made: Plan
     about: dict[str, Any]
     live: LiveEvents | None
+    beside: Callable[[Step], None] | None = None  # told of every step, too
     progress: Progress = field(default_factory=Progress)
     frame: Frame | None = None  # the last
     before: int = 0  # frames tracked before it was gone on with
@@ -83,6 +84,8 @@ class _Running:
             now = replace(now, regions=now.regions + len(step.regions))
         if self.live is not None:
             self.live.tell(step)
+        if self.beside is not None:
+            self.beside(step)
         self.progress = replace(now, context=context, left_out=unusable)
 
     def now(self) -> tuple[Progress, Frame | None]:
@@ -108,13 +111,14 @@ def run(
     live: LiveEvents | None = None,
     resume: bool = False,
     every: float = EVERY,
+    beside: Callable[[Step], None] | None = None,
 ) -> Outcome:
     """Run a plan into a folder: log, results, film; whatever happens, what was tracked so far is kept.
 
     With `resume` the run that the folder holds is gone on with from its last checkpoint, or from the beginning where it
-    has none; `every` so many seconds there is a new one.
+    has none; `every` so many seconds there is a new one. `beside` is told of every step.
     """
-    running = _Running(made, asked(made, reporting, window or {}, inputs), live)
+    running = _Running(made, asked(made, reporting, window or {}, inputs), live, beside)
     try:
         with Ending() as ending:
             outcome = _tracked(running, folder, reporting, film, ending, resume, every)

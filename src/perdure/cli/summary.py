@@ -30,6 +30,7 @@ class Row:
     defect: str = ""
     before: bool = False  # done by an earlier call
     scored: Score | None = None
+    seconds: float = 0.0  # of work, by all workers
 
     @property
     def word(self) -> str:

@@ -15,6 +15,7 @@ import typer
 
 from perdure import cluster, params
 from perdure.cli import options
+from perdure.cli.doing import stoppable
 from perdure.cli.jobs import told_apart
 from perdure.cli.progress import watched
 from perdure.cli.run import (
@@ -24,7 +25,6 @@ from perdure.cli.run import (
     TruthsOption,
     WorkersOption,
     own_words,
-    stoppable,
     truths_of,
 )
 from perdure.cli.tables import aligned

@@ -76,7 +76,7 @@ def read_span(start: str | float | None, end: str | float | None, stride: int) -
     """
     if isinstance(stride, bool) or not isinstance(stride, Integral) or stride < 1:
         raise ParameterError(f"stride = {shown(stride)} is out of range: it must be a whole number ≥ 1")
-    span = Span(_moment("start", start), _moment("end", end), int(stride))
+    span = Span(read_moment("start", start), read_moment("end", end), int(stride))
     if span.end is not None and not (span.end.frame or span.end.seconds):
         raise ParameterError(no_frame(Span(end=span.end)))
     if span.start is not None and span.end is not None:
@@ -145,7 +145,14 @@ def real(value: object) -> float:
         return math.inf
 
 
-def _moment(what: str, given: str | float | None) -> Moment | None:
+def read_moment(what: str, given: str | float | None) -> Moment | None:
+    """Return the moment that a user means, `what` by name; None for none.
+
+    Raises
+    ------
+    ParameterError
+        For what is malformed, negative or beyond 10^9.
+    """
     if given is None:
         return None
     moment = _read_moment(given.strip()) if isinstance(given, str) else _seconds(given)

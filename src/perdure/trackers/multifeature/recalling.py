@@ -23,7 +23,7 @@ from perdure.trackers.multifeature.targets import NEVER, Rows, Targets
 from perdure.types import Boxes, Event, Frame, Regions, Renamed
 
 Index = NDArray[np.intp]
-_SPACING = 0.4  # s between looks
+SPACING = 0.4  # s between looks
 _SOON = 1.0  # s, about which looks are all as near to each other as they come
 _KEPT = 6  # looks from before a doubt that are kept through it
 _ALONE = 0.1  # share of a box in another up to which it is seen by itself
@@ -35,8 +35,8 @@ _SAME, _OTHER, _SPREAD, _TOGETHER = (
     0.12,
     0.5,
 )  # similarities before anything was seen, and how they go together
-_RIVALS = 3  # others that each new look is compared with
-_FARTHEST, _SLACK = 1.5, 1.0  # heights a second, heights: how far one may go while nobody sees it
+RIVALS = 3  # others that each new look is compared with
+FARTHEST, SLACK = 1.5, 1.0  # heights a second, heights: how far one may go while nobody sees it
 _MOST = 10.0  # nats, more than log odds can be
 _BORDER = 0.15  # heights from the border of the picture, within which one is not inside it
 _DOUBT = 2.0  # s for which one that has an id may still turn out to be another
@@ -88,8 +88,8 @@ def looked(
     Only they are described, by `kinds`, the features of looks. Who is in `doubt` since some time (N,) keeps looks from
     before it.
     """
-    alone = _alone(regions.boxes, size)
-    due = frame.time - targets.looked[:, -1] >= _SPACING - 1e-9
+    alone = by_themselves(regions.boxes, size)
+    due = frame.time - targets.looked[:, -1] >= SPACING - 1e-9
     fresh = np.flatnonzero((region >= 0) & due & alone[region])
     if not len(fresh):
         return targets, telling, fresh
@@ -100,7 +100,7 @@ def looked(
     )
     fresh, new = fresh[there], {name: some[there] for name, some in new.items()}
     telling = _learnt(kinds, targets, fresh, new, telling, frame.time)
-    order = _slots(targets.looked[fresh], doubt[fresh], frame.time)
+    order = slots(targets.looked[fresh], doubt[fresh], frame.time)
     looks = {name: old.copy() for name, old in targets.looks.items()}
     for name, old in looks.items():
         old[fresh] = np.concatenate([old[fresh], new[name][:, None]], axis=1)[
@@ -112,7 +112,7 @@ def looked(
     return targets.replace(looks=looks, looked=when), telling, fresh
 
 
-def _slots(when: NDArray[np.float64], doubt: NDArray[np.float64], time: float) -> Index:
+def slots(when: NDArray[np.float64], doubt: NDArray[np.float64], time: float) -> Index:
     """Which of the looks (F, E) of some times and a new one are kept (F, E): many of late, few of long ago.
 
     The one goes that is nearest to its neighbours in time for its age: things look different from every side, and one
@@ -194,7 +194,7 @@ def recall(
     height = np.maximum(
         targets.last[one, 3] - targets.last[one, 1], targets.last[other, 3] - targets.last[other, 1]
     )
-    possible = (gap > 0) & (way <= height * (_SLACK + _FARTHEST * gap))
+    possible = (gap > 0) & (way <= height * (SLACK + FARTHEST * gap))
     odds = np.full(len(one), -np.inf)
     some = np.flatnonzero(possible)
     if len(some):
@@ -203,7 +203,7 @@ def recall(
         theirs = {kind.name: targets.looks[kind.name][other[some]] for kind in kinds}
         numbers = alike(kinds, mine, there, theirs, here).astype(np.float64)
         odds[some] = log_odds(telling.same, telling.other, numbers) - way[some] / (
-            height[some] * (_SLACK + _FARTHEST * gap[some])
+            height[some] * (SLACK + FARTHEST * gap[some])
         )
     table = odds.reshape(len(lost), len(newcomers))
     pairs = assign(np.where(table >= likeness, _MOST - table, np.inf)).pairs
@@ -257,7 +257,7 @@ def _learnt(
     seen = np.flatnonzero((targets.missed == 0) & there.any(axis=1))
     apart = _middle(targets.last[fresh])[:, None] - _middle(targets.last[seen])[None]
     far = np.where(fresh[:, None] == seen, np.inf, np.hypot(apart[..., 0], apart[..., 1]))
-    near = np.argsort(far, axis=1, kind="stable")[:, :_RIVALS]
+    near = np.argsort(far, axis=1, kind="stable")[:, :RIVALS]
     row, column = np.nonzero(np.isfinite(np.take_along_axis(far, near, axis=1)))
     other = telling.other
     if len(row):
@@ -276,7 +276,7 @@ def _against(
     return alike(kinds, looks, there[which], one, np.ones((len(which), 1), np.bool_)).astype(np.float64)
 
 
-def _alone(boxes: Boxes, size: tuple[int, int]) -> NDArray[np.bool_]:
+def by_themselves(boxes: Boxes, size: tuple[int, int]) -> NDArray[np.bool_]:
     """Which regions (N,) are seen by themselves and whole; one more, False, for no region."""
     shared = intersections(boxes, boxes)
     np.fill_diagonal(shared, 0.0)
@@ -289,8 +289,12 @@ def _alone(boxes: Boxes, size: tuple[int, int]) -> NDArray[np.bool_]:
 
 def within(targets: Targets, size: tuple[int, int]) -> NDArray[np.bool_]:
     """Which targets (N,) were not at the border when they were seen last, nor going over it."""
+    return inside(targets.last, size)
+
+
+def inside(boxes: Boxes, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Which boxes (N, 4) are not at the border of a picture (height, width), nor go over it."""
     height, width = size
-    boxes = targets.last
     margin = _BORDER * (boxes[:, 3] - boxes[:, 1])
     return np.asarray(
         (boxes[:, 0] > margin)
