@@ -40,6 +40,15 @@ def test_a_clip_that_begins_with_somebody_in_it_leaves_no_ghost_after_a_first_lo
         assert len(regions) == len(world.truth().in_frame(k))
 
 
+def test_a_film_that_is_entered_late_leaves_no_ghost_of_who_is_there_then():
+    """What stands in the first picture is not what was there in all the time before it."""
+    world = World((Block(walk((5, 30), (2, 0))),))
+    detector = Background().prepare(world.frames()[::4])
+    late = [Frame(frame.index + 300, frame.time + 30.0, frame.image) for frame in world.frames()]
+    for k, regions in enumerate(regions_of(world, detector, late)):
+        assert len(regions) == len(world.truth().in_frame(k))
+
+
 def test_live_a_ghost_is_gone_within_a_second_or_two():
     world = World((Block(walk((5, 30), (2, 0))),), count=60)
     counts = [len(regions) for regions in regions_of(world)]

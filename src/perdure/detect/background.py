@@ -187,7 +187,8 @@ class Background:
         if not state.mean.size:
             noise = np.full(image.shape[:2], self.least_noise**2, np.float32)
             state = _placed(state, image.astype(np.float32), noise)
-        elapsed = max(frame.time - state.time, 0.1 / state.fps)
+        begun = state.time >= 0  # a film that is entered late tells nothing of the time before
+        elapsed = max(frame.time - state.time, 0.1 / state.fps) if begun else 1.0 / state.fps
         factor = exposure(image, state.mean)
         if self.steady:
             place = shift(image, state.mean, factor)
