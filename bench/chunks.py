@@ -65,7 +65,20 @@ CLIPS = {
     },
 }  # fmt: skip
 TRACKERS = ("compound", "multifeature")
-HEAD = ["clip", "tracker", "chunks", "borders", "alive", "joined %", "wrong", "kept %", "IDF1", "HOTA", "wall", "work"]
+HEAD = [
+    "clip",
+    "tracker",
+    "chunks",
+    "borders",
+    "alive",
+    "joined %",
+    "wrong",
+    "kept %",
+    "IDF1",
+    "HOTA",
+    "wall",
+    "work",
+]
 
 
 @dataclass(frozen=True)
@@ -149,8 +162,22 @@ def rows_of(folder: Path) -> Rows:
 
 def ran(data: Path, clip: Clip, tracker: str, into: Path, words: Sequence[str]) -> Ran:
     """Call `perdure run` and return where the run is and what it took."""
-    command = [sys.executable, "-m", "perdure", "run", str(data / clip.source), "--tracker", tracker, "-o", str(into)]
-    command += ["--json", *words, *([] if clip.detections is None else ["--detector", str(data / clip.detections)])]
+    command = [
+        sys.executable,
+        "-m",
+        "perdure",
+        "run",
+        str(data / clip.source),
+        "--tracker",
+        tracker,
+        "-o",
+        str(into),
+    ]
+    command += [
+        "--json",
+        *words,
+        *([] if clip.detections is None else ["--detector", str(data / clip.detections)]),
+    ]
     begun, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     wall, after = time.monotonic() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -197,7 +224,16 @@ def table_of(values: Sequence[Mapping[str, Any]]) -> Table:
         ratios = [f"{one[name][1] / max(one[name][0], 1e-9):.2f}" for name in ("wall", "work")]
         counts = [str(one[name]) for name in ("borders", "alive")]
         rows.append(
-            [one["clip"], one["tracker"], f"{one['chunks']} s", *counts, share, str(one["wrong"]), *scores, *ratios]
+            [
+                one["clip"],
+                one["tracker"],
+                f"{one['chunks']} s",
+                *counts,
+                share,
+                str(one["wrong"]),
+                *scores,
+                *ratios,
+            ]
         )
     return Table("Chunks against the unbroken run (unbroken / chunked)", HEAD, rows)
 

@@ -16,7 +16,9 @@ from perdure.types import Report, Tracks
 RED, BLUE, GREEN = (200, 40, 40), (40, 60, 220), (30, 160, 60)
 
 
-def tracked(world: World, begin: int, end: int, shared: list[tuple[int, int]], tracker: str) -> tuple[Part, Tracks]:
+def tracked(
+    world: World, begin: int, end: int, shared: list[tuple[int, int]], tracker: str
+) -> tuple[Part, Tracks]:
     """A part of a world, tracked as if nothing else had ever been."""
     album = Album.empty(looks_for(world.scene))
     reports: list[Report] = []
@@ -29,9 +31,7 @@ def tracked(world: World, begin: int, end: int, shared: list[tuple[int, int]], t
     return Part.of(begin, end, settled, shared, looks), Tracks.join(settled)
 
 
-def stitched(
-    world: World, spans: list[tuple[int, int]], tracker: str = "multifeature"
-) -> tuple[Tracks, Stitched]:
+def stitched(world: World, spans: list[tuple[int, int]], tracker: str = "multifeature") -> tuple[Tracks, Stitched]:
     """The tracks of a world that was tracked in parts, by the names that identities have in the end."""
     shared = [(spans[k + 1][0], spans[k][1]) for k in range(len(spans) - 1)]
     both = [
@@ -127,7 +127,9 @@ def standing(places: dict[int, int], frames: range) -> Tracks:
 def test_two_who_were_seen_together_are_never_one_by_whatever_chain():
     """Part 1 takes two for one whom parts 0 and 2 tell apart: only one of them goes on."""
     part = [
-        Part(0, 20, {1: life(0, 19, 50), 2: life(0, 9, 50)}, standing({1: 50}, range(10, 20)), frozenset({(1, 2)})),
+        Part(
+            0, 20, {1: life(0, 19, 50), 2: life(0, 9, 50)}, standing({1: 50}, range(10, 20)), frozenset({(1, 2)})
+        ),
         Part(10, 40, {1: life(10, 39, 50)}, standing({1: 50}, range(10, 40)), frozenset()),
     ]
     scene = World((), width=120).scene
@@ -164,8 +166,6 @@ def test_the_handover_is_where_both_parts_agree_and_else_in_the_middle():
 
 
 def test_names_count_in_the_order_in_which_identities_appear():
-    said, final = names(
-        [{4: 0, 2: 5}, {1: 20, 3: 25}], [Join((0, 2), (1, 3), 20, 24, 5, 0.9, float("nan"), 0.0)]
-    )
+    said, final = names([{4: 0, 2: 5}, {1: 20, 3: 25}], [Join((0, 2), (1, 3), 20, 24, 5, 0.9, float("nan"), 0.0)])
     assert final == [{4: 1, 2: 2}, {1: 3, 3: 2}]
     assert said == [{4: 1, 2: 2}, {1: 3, 3: 4}]
