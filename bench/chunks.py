@@ -5,8 +5,9 @@
 
 Each clip is tracked by each tracker in one go (`perdure run --workers 1`) and in chunks (`--chunks T --workers N`).
 *alive* counts, over all borders, the identities of the unbroken run that have rows in the ten seconds before a border and
-behind it. One is *joined* if the chunked run has one and the same identity in its places, on both sides: by
-the majority of the second of rows that is nearest to the border on each side, at an intersection over union of .5. *wrong*
+behind it. One is *joined* if the chunked run has one and the same identity in its places on both sides: by the
+majority of the second's worth of rows nearest to the border in which the chunked run has anybody there, at an intersection
+over union of .5; who it has nowhere on one side is not joined. *wrong*
 counts the identities of the chunked run that are one of the unbroken run's before and another behind. *kept* is the
 share of true objects with rows on both sides that keep one identity, of the unbroken run and of the chunked one.
 *wall* is how many times as long the chunked run took by the clock, with all its starting and stitching; *work* how many
@@ -126,7 +127,9 @@ def _at(reference: Rows, pairs: Mapping[tuple[int, int], int], border: int, fps:
             sides[frame >= border].setdefault(one, []).append(frame)
     before, behind = (
         {
-            one: _majority([pairs.get((frame, one), 0) for frame in sorted(some, reverse=not late)[:nearest]])
+            one: _majority(
+                [pairs[frame, one] for frame in sorted(some, reverse=not late) if (frame, one) in pairs][:nearest]
+            )
             for one, some in side.items()
         }
         for late, side in enumerate(sides)
@@ -139,8 +142,8 @@ def _at(reference: Rows, pairs: Mapping[tuple[int, int], int], border: int, fps:
 
 
 def _majority(said: Sequence[int]) -> int:
-    """The identity that most rows have; 0 where most have none."""
-    return Counter(said).most_common(1)[0][0]
+    """The identity that most rows have; 0 where there is none."""
+    return Counter(said).most_common(1)[0][0] if said else 0
 
 
 def _paired(reference: Rows, run: Rows) -> dict[tuple[int, int], int]:

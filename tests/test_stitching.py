@@ -9,6 +9,7 @@ from worlds import Block, World, crossing, two_apart, walk
 from perdure.fold import Corrections, settle_by_frame, track
 from perdure.looks import Album, looked_at, portraits
 from perdure.stitching import Join, Life, Part, Stitched, names, stitch
+from perdure.stitching.joining import Chains
 from perdure.trackers import TRACKERS
 from perdure.trackers.multifeature.weights import looks_for
 from perdure.types import Report, Tracks
@@ -137,9 +138,8 @@ def test_two_who_were_seen_together_are_never_one_by_whatever_chain():
     assert [(one.earlier, one.later) for one in stitch(twice, scene, ()).joins] == [
         ((0, 1), (1, 1)), ((1, 1), (2, 7)),
     ]  # fmt: skip
-    from perdure.stitching import _Chains
 
-    chains = _Chains(twice)
+    chains = Chains(twice)
     assert all(chains.join(one) for one in stitch(twice, scene, ()).joins)
     assert not chains.join(Join((0, 2), (2, 7), 9, 30, 0, float("nan"), 6.0, 2.0))
 
