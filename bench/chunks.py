@@ -57,13 +57,13 @@ class Clip(NamedTuple):
 
 
 CLIPS = {
-    "pets09-s2l1": Clip("pets09-s2l1/video.avi", "pets09-s2l1/gt/gt.txt", None, ("10", "20")),
-    "crowd8": Clip("composites/crowd8/video.mp4", "composites/crowd8/gt/gt.txt", None, ("4", "6")),
-    "cdnet-highway": Clip("cdnet-highway/video.avi", None, None, ("8",)),
+    "pets09-s2l1": Clip("pets09-s2l1/video.avi", "pets09-s2l1/gt/gt.txt", None, ("20", "10")),
+    "crowd8": Clip("composites/crowd8/video.mp4", "composites/crowd8/gt/gt.txt", None, ("4",)),
     **{
-        name: Clip(f"mot17-text/{name}", f"mot17-text/{name}/gt/gt.txt", f"mot17-text/{name}/det/det_FRCNN.txt", ("8",))
-        for name in ("MOT17-02", "MOT17-04", "MOT17-10")
+        name: Clip(f"mot17-text/{name}", f"mot17-text/{name}/gt/gt.txt", f"mot17-text/{name}/det/det_FRCNN.txt", ("5",))
+        for name in ("MOT17-02", "MOT17-10")
     },
+    "cdnet-highway": Clip("cdnet-highway/video.avi", None, None, ("8",)),
 }  # fmt: skip
 TRACKERS = ("compound", "multifeature")
 HEAD = [
