@@ -141,7 +141,7 @@ def test_two_who_were_seen_together_are_never_one_by_whatever_chain():
 
     chains = Chains(twice)
     assert all(chains.join(one) for one in stitch(twice, scene, ()).joins)
-    assert not chains.join(Join((0, 2), (2, 7), 9, 30, 0, float("nan"), 6.0, 2.0))
+    assert not chains.join(Join((0, 2), (2, 7), 9, 30, 0, float("nan"), 6.0, 2.0, 6.0))
 
 
 def test_a_group_is_never_one_of_its_members():
@@ -166,6 +166,8 @@ def test_the_handover_is_where_both_parts_agree_and_else_in_the_middle():
 
 
 def test_names_count_in_the_order_in_which_identities_appear():
-    said, final = names([{4: 0, 2: 5}, {1: 20, 3: 25}], [Join((0, 2), (1, 3), 20, 24, 5, 0.9, float("nan"), 0.0)])
+    said, final = names(
+        [{4: 0, 2: 5}, {1: 20, 3: 25}], [Join((0, 2), (1, 3), 20, 24, 5, 0.9, float("nan"), 0.0, 9.0)]
+    )
     assert final == [{4: 1, 2: 2}, {1: 3, 3: 2}]
     assert said == [{4: 1, 2: 2}, {1: 3, 3: 4}]

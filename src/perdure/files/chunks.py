@@ -272,15 +272,17 @@ def _corrections(
 
 
 def _event(join: Join, name: int, border: int) -> Event:
-    odds = "" if math.isnan(join.odds) else f"log odds {join.odds:.1f}"
+    looks = "" if math.isnan(join.odds) else f", looks {join.odds:.1f}"
     if math.isnan(join.score):
-        why = f"by its looks, after {join.gap:.1f} s hidden over the border at frame {border}: {odds}"
+        why = f"hidden for {join.gap:.1f} s over the border at frame {border}"
     else:
         why = (
             f"by its places in {join.frames} frames that both parts at the border of frame {border} saw: "
-            f"global similarity {join.score:.2f}{odds and f', looks {odds}'}"
+            f"global similarity {join.score:.2f}"
         )
-    return Event(JOINED, join.begin, join.end, (name,), why=why)
+    why += f"; log odds {join.sure:.1f}{looks}"
+    confidence = round(1.0 / (1.0 + math.exp(-join.sure)), 6)
+    return Event(JOINED, join.begin, join.end, (name,), confidence=confidence, why=why)
 
 
 def _borders(stitched: Stitched) -> tuple[Border, ...]:

@@ -15,7 +15,11 @@ from perdure.types import Scene, Status, Tracks
 
 _NEAR = 1.0  # s about the handover within which places count most
 _AGREED = 0.6  # global similarity from which both parts agree
-_BEYOND = 0.25  # share of the overlap at its begin and end in which nothing is handed over
+HANDOVER = (
+    0.25,
+    0.5,
+    0.75,
+)  # shares of the overlap: from where, where as a rule, and up to where it is handed over
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +57,13 @@ class Border:
 
 
 def _handover(first: int, behind: int, apart: Mapping[int, float]) -> int:
-    """The frame from which the later part is told: where both disagree least, of equals the nearest to the middle."""
-    middle, margin = (first + behind) // 2, int(_BEYOND * (behind - first))
-    known = range(min(first + margin, middle), max(behind - margin, middle + 1))
+    """The frame from which the later part is told: where both disagree least, of equals the nearest to the usual."""
+    low, usual, high = (first + round(share * (behind - first)) for share in HANDOVER)
 
     def doubt(frame: int) -> tuple[float, int]:
-        return apart.get(frame - 1, 0.0) + apart.get(frame, 0.0), abs(frame - middle)
+        return apart.get(frame - 1, 0.0) + apart.get(frame, 0.0), abs(frame - usual)
 
-    return min(known, key=doubt)
+    return min(range(min(low, usual), max(high, usual + 1)), key=doubt)
 
 
 def joins_at(border: Border, number: int, parts: Sequence[Part], likeness: Likeness) -> list[Join]:
@@ -86,8 +89,9 @@ def joins_at(border: Border, number: int, parts: Sequence[Part], likeness: Liken
     score[rows, columns] = nats(mean[rows, columns] + LEAST) + np.nan_to_num(odds)
     score[score <= 0] = -np.inf
     told = dict(zip(zip(rows.tolist(), columns.tolist(), strict=True), odds.tolist(), strict=True))
-    pairs = sorted(map(tuple, optimal(score).tolist()), key=lambda pair: (-score[pair], pair))
-    return [_join(border, number, row, column, told[row, column]) for row, column in pairs]
+    best = [(row, column) for row, column in optimal(score).tolist()]
+    pairs = sorted(best, key=lambda pair: (-float(score[pair]), pair))
+    return [_join(border, number, pair, told[pair], float(score[pair])) for pair in pairs]
 
 
 def _of_one_kind(border: Border, number: int, parts: Sequence[Part]) -> NDArray[np.bool_]:
@@ -99,7 +103,8 @@ def _of_one_kind(border: Border, number: int, parts: Sequence[Part]) -> NDArray[
     return np.asarray((sides[0][:, None] == sides[1]) & (sides[0][:, None] >= 0))
 
 
-def _join(border: Border, number: int, row: int, column: int, odds: float) -> Join:
+def _join(border: Border, number: int, pair: tuple[int, int], odds: float, sure: float) -> Join:
+    row, column = pair
     seen = np.flatnonzero(~np.isnan(border.similar[:, row, column]))
     return Join(
         (number, border.earlier[row]),
@@ -110,6 +115,7 @@ def _join(border: Border, number: int, row: int, column: int, odds: float) -> Jo
         float(np.mean(border.similar[seen, row, column])),
         odds,
         0.0,
+        sure,
     )
 
 

@@ -60,21 +60,22 @@ def joins_of_hidden(
     lost = [one for one, within in zip(ends, whole.tolist(), strict=True) if within]
     pairs = list(_possible(parts, lost, begins, recall.longest))
     rows, columns = sorted({one for one, _ in pairs}), sorted({other for _, other in pairs})
+    row_of, column_of = ({one: k for k, one in enumerate(some)} for some in (rows, columns))
+    places = {both: (row_of[both[0]], column_of[both[1]]) for both in pairs}
     odds = np.full((len(rows), len(columns)), -np.inf)
+    alike = np.full(odds.shape, np.nan)
     for (p, q), group in groupby(sorted(pairs, key=_parts_of), key=_parts_of):
         some = list(group)
         looks = likeness.odds((p, [one[1] for one, _ in some]), (q, [other[1] for _, other in some]))
-        for (one, other), value in zip(some, looks.tolist(), strict=True):
-            odds[rows.index(one), columns.index(other)] = _odds(parts, one, other, value, scene)
+        for both, value in zip(some, looks.tolist(), strict=True):
+            alike[places[both]], odds[places[both]] = value, _odds(parts, *both, value, scene)
     sure = optimal(np.where(odds >= recall.least, odds + 1.0, -np.inf).astype(np.float32)).tolist()
     found = [
-        (float(odds[row, column]), rows[row], columns[column])
+        _join(parts, rows[row], columns[column], float(alike[row, column]), float(odds[row, column]))
         for row, column in sure
         if odds[row, column] >= _rival(odds, row, column) + recall.margin
     ]
-    return [
-        _join(parts, one, other, value) for value, one, other in sorted(found, key=lambda each: (-each[0], each))
-    ]
+    return sorted(found, key=lambda join: (-join.sure, join.earlier, join.later))
 
 
 def _possible(
@@ -115,9 +116,9 @@ def _rival(odds: NDArray[np.float64], row: int, column: int) -> float:
     return float(others.max(initial=-np.inf))
 
 
-def _join(parts: Sequence[Part], one: Who, other: Who, odds: float) -> Join:
+def _join(parts: Sequence[Part], one: Who, other: Who, looks: float, sure: float) -> Join:
     life, later = _life(parts, one), _life(parts, other)
-    return Join(one, other, life.last, later.first, 0, float("nan"), odds, later.begin - life.end)
+    return Join(one, other, life.last, later.first, 0, float("nan"), looks, later.begin - life.end, sure)
 
 
 def _parts_of(pair: tuple[Who, Who]) -> tuple[int, int]:

@@ -79,7 +79,7 @@ class Join(NamedTuple):
 
     `earlier` and `later` are (number of the part, identity in it); `begin` and `end` the frames of the overlap in which
     both were seen, or between which nobody saw it; `score` is the global similarity there, NaN for who was hidden;
-    `odds` the log odds of looks, NaN where nothing is known of them.
+    `odds` the log odds of looks, NaN where nothing is known of them; `sure` what all that tells, in nats.
     """
 
     earlier: tuple[int, int]
@@ -90,6 +90,7 @@ class Join(NamedTuple):
     score: float
     odds: float
     gap: float  # s for which nobody saw it
+    sure: float
 
 
 def _seen(rows: Tracks) -> NDArray[np.bool_]:

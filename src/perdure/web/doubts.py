@@ -3,7 +3,8 @@
 =====================  =================================================================================
 kind                   doubt
 =====================  =================================================================================
-resolved, found_again  1 - the confidence with which the tracker decided
+resolved, found_again, 1 - the confidence with which it was decided
+joined
 mended, exchanged,     these carry no figure: `PLAIN`
 approximated, lost
 narrow                 a stretch of links that another id would have had nearly as well: by their least margin

@@ -16,6 +16,7 @@ export function chip(id, { inert = false } = {}) {
 
 const WORDS = {
   resolved: "Identity resolved", found_again: "Found again", mended: "Mended", exchanged: "Identities exchanged",
+  joined: "Joined over a border",
   approximated: "Approximated", lost: "Lost", narrow: "Narrow link", appeared: "Appeared inside", entered: "Entered",
   left: "Left", merge: "Merge", split: "Split", mixed: "Mixed", occluded: "Hidden", partly_occluded: "Partly hidden",
   suspended: "Suspended", light: "Light changed", removed: "Something removed", abandoned: "Something left behind",
