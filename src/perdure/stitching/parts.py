@@ -109,33 +109,6 @@ def _note(lives: dict[int, Life], seen: Tracks, groups: set[int]) -> None:
         lives[one] = known._replace(last=frame, end=time, place=box, kind=kind, group=known.group or one in groups)
 
 
-def _apart(self, one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether a part saw both in one frame at two places, or one is a group and the other is not."""
-    if self._life(one).group != self._life(other).group:
-        return True
-    return one[0] == other[0] and (min(one[1], other[1]), max(one[1], other[1])) in self._parts[one[0]].together
-
-
-def _seen(rows: Tracks) -> NDArray[np.bool_]:
-    """Which rows rest on something seen."""
-    return np.asarray(~rows.inferred & (rows.status != Status.LOST) & (rows.status != Status.OCCLUDED))
-
-
-def _within(rows: Tracks, first: int, behind: int) -> Tracks:
-    return rows.take((rows.frames >= first) & (rows.frames < behind) & (rows.status != Status.LOST))
-
-
-def _note(lives: dict[int, Life], seen: Tracks, groups: set[int]) -> None:
-    """Note where everybody is who is seen in a frame."""
-    for row, one in enumerate(seen.ids.tolist()):
-        frame, time, box = int(seen.frames[row]), float(seen.times[row]), tuple(seen.boxes[row].tolist())
-        known = lives.get(one)
-        if known is None:
-            known = Life(frame, time, box, frame, time, box, str(seen.classes[row]), one in groups)
-        kind = known.kind or str(seen.classes[row])
-        lives[one] = known._replace(last=frame, end=time, place=box, kind=kind, group=known.group or one in groups)
-
-
 def _apart(seen: Tracks) -> set[tuple[int, int]]:
     """Pairs of identities that are seen at two places of one frame."""
     shared = intersections(seen.boxes, seen.boxes)
