@@ -153,16 +153,16 @@ def test_a_group_is_never_one_of_its_members():
     assert stitch(parts, World((), width=120).scene, ()).joins == ()
 
 
-def test_the_handover_is_where_both_parts_agree_and_else_in_the_middle():
+def test_the_handover_is_where_both_parts_agree_and_else_at_three_quarters():
     quiet = Part(0, 40, {}, Tracks.empty(), frozenset()), Part(20, 60, {}, Tracks.empty(), frozenset())
     scene = World((), width=120).scene
-    assert stitch(quiet, scene, ()).handovers == (30,)
+    assert stitch(quiet, scene, ()).handovers == (35,)
     seen = standing({1: 50}, range(20, 40))
-    missed = seen.take((seen.frames < 24) | (seen.frames >= 32))
-    missed = Tracks.join([missed, standing({2: 90}, range(24, 32))])
-    lives = {1: life(20, 39, 50), 2: life(24, 31, 90)}
+    missed = seen.take((seen.frames < 33) | (seen.frames >= 37))
+    missed = Tracks.join([missed, standing({2: 90}, range(33, 37))])
+    lives = {1: life(20, 39, 50), 2: life(33, 36, 90)}
     parts = [Part(0, 40, {1: life(0, 39, 50)}, seen, frozenset()), Part(20, 60, lives, missed, frozenset())]
-    assert stitch(parts, scene, ()).handovers == (33,)
+    assert stitch(parts, scene, ()).handovers == (32,)
 
 
 def test_names_count_in_the_order_in_which_identities_appear():

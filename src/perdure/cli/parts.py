@@ -23,7 +23,7 @@ from perdure.pipeline import Plan
 from perdure.trackers.multifeature.weights import looks_for
 from perdure.types import Report
 
-OVERLAP = 4.0  # s: twice the time for which trackers look for who is not seen, to either side of the handover
+OVERLAP = 4.0  # s: twice the time for which trackers look for who is not seen
 _LEAST = 4  # frames of an overlap: one to see, one to say, on both sides
 
 

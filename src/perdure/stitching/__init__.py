@@ -5,8 +5,8 @@ tracker's global similarity of places and sizes (eq. 10, eq. 16), nearest the fr
 odds of looks. Who was hidden there is known again by looks alone, where they leave no doubt. Two identities whom one part
 has seen in one frame at two places are never one, by whatever chain of parts.
 
-The handover is where both parts agree best on who is where, about the middle: before it the later part has not seen
-enough, behind it the earlier one has not seen what follows.
+The handover is where both parts agree best on who is where, about three quarters into the overlap: before it the later
+part has not seen enough, behind it the earlier one has not seen what follows.
 """
 
 from perdure.stitching.hidden import Recall

@@ -15,11 +15,8 @@ from perdure.types import Scene, Status, Tracks
 
 _NEAR = 1.0  # s about the handover within which places count most
 _AGREED = 0.6  # global similarity from which both parts agree
-HANDOVER = (
-    0.25,
-    0.5,
-    0.75,
-)  # shares of the overlap: from where, where as a rule, and up to where it is handed over
+# Shares of the overlap: from where, where as a rule, and up to where it is handed over.
+_HANDOVER = (0.5, 0.75, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +55,7 @@ class Border:
 
 def _handover(first: int, behind: int, apart: Mapping[int, float]) -> int:
     """The frame from which the later part is told: where both disagree least, of equals the nearest to the usual."""
-    low, usual, high = (first + round(share * (behind - first)) for share in HANDOVER)
+    low, usual, high = (first + round(share * (behind - first)) for share in _HANDOVER)
 
     def doubt(frame: int) -> tuple[float, int]:
         return apart.get(frame - 1, 0.0) + apart.get(frame, 0.0), abs(frame - usual)
