@@ -11,7 +11,8 @@ over union of .5; who it has nowhere on one side is not joined. *wrong*
 counts the identities of the chunked run that are one of the unbroken run's before and another behind. *kept* is the
 share of true objects with rows on both sides that keep one identity, of the unbroken run and of the chunked one.
 *wall* is how many times as long the chunked run took by the clock, with all its starting and stitching; *work* how many
-times as much processor time, which other programs on the machine do not change. --write puts the table into docs/many.md.
+times as much processor time, which other programs on the machine change little; of runs that --keep holds from an
+earlier call neither is told. --write puts the table into docs/many.md.
 """
 
 from __future__ import annotations
@@ -57,29 +58,17 @@ class Clip(NamedTuple):
 
 
 CLIPS = {
-    "pets09-s2l1": Clip("pets09-s2l1/video.avi", "pets09-s2l1/gt/gt.txt", None, ("20", "10")),
+    "pets09-s2l1": Clip("pets09-s2l1/video.avi", "pets09-s2l1/gt/gt.txt", None, ("20",)),
     "crowd8": Clip("composites/crowd8/video.mp4", "composites/crowd8/gt/gt.txt", None, ("4",)),
     **{
-        name: Clip(f"mot17-text/{name}", f"mot17-text/{name}/gt/gt.txt", f"mot17-text/{name}/det/det_FRCNN.txt", ("5",))
-        for name in ("MOT17-02", "MOT17-10")
+        name: Clip(f"mot17-text/{name}", f"mot17-text/{name}/gt/gt.txt", f"mot17-text/{name}/det/det_FRCNN.txt", (length,))
+        for name, length in (("MOT17-02", "4"), ("MOT17-10", "8"))
     },
-    "cdnet-highway": Clip("cdnet-highway/video.avi", None, None, ("8",)),
 }  # fmt: skip
 TRACKERS = ("compound", "multifeature")
 HEAD = [
-    "clip",
-    "tracker",
-    "chunks",
-    "borders",
-    "alive",
-    "joined %",
-    "wrong",
-    "kept %",
-    "IDF1",
-    "HOTA",
-    "wall",
-    "work",
-]
+    "clip", "tracker", "chunks", "borders", "alive", "joined %", "wrong", "kept %", "IDF1", "HOTA", "wall", "work",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -109,8 +98,8 @@ class Ran(NamedTuple):
     """One call of `perdure run`."""
 
     folder: Path
-    wall: float
-    work: float  # s of processor time
+    wall: float | None  # s; None where it was there before
+    work: float | None  # s of processor time
 
 
 def judged(reference: Rows, run: Rows, borders: Sequence[int], fps: float) -> Judged:
@@ -188,7 +177,7 @@ def ran(data: Path, clip: Clip, tracker: str, into: Path, words: Sequence[str]) 
         raise PerdureError(f"{' '.join(command)} ended with {done.returncode}: {done.stderr.strip()[-300:]}")
     (job,) = json.loads(done.stdout.splitlines()[-1])["jobs"]
     work = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return Ran(Path(job["run"]), wall, work)
+    return Ran(Path(job["run"]), *((None, None) if job["skipped"] else (wall, work)))
 
 
 def compared(data: Path, name: str, tracker: str, length: str, unbroken: Ran, chunked: Ran) -> dict[str, Any]:
@@ -224,7 +213,7 @@ def table_of(values: Sequence[Mapping[str, Any]]) -> Table:
     for one in values:
         share = f"{100 * one['joined'] / one['alive']:.1f}" if one["alive"] else "-"
         scores = [_pair(one.get(name)) for name in ("kept", "IDF1", "HOTA")]
-        ratios = [f"{one[name][1] / max(one[name][0], 1e-9):.2f}" for name in ("wall", "work")]
+        ratios = [_ratio(*one[name]) for name in ("wall", "work")]
         counts = [str(one[name]) for name in ("borders", "alive")]
         rows.append(
             [
@@ -239,6 +228,10 @@ def table_of(values: Sequence[Mapping[str, Any]]) -> Table:
             ]
         )
     return Table("Chunks against the unbroken run (unbroken / chunked)", HEAD, rows)
+
+
+def _ratio(unbroken: float | None, chunked: float | None) -> str:
+    return f"{chunked / unbroken:.2f}" if unbroken and chunked else "-"
 
 
 def _pair(both: Sequence[float] | None) -> str:
