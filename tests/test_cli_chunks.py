@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import os
 from pathlib import Path
 
 import numpy as np
@@ -168,7 +167,6 @@ def test_parts_of_another_window_are_other_jobs(place: Path):
 @pytest.mark.slow
 def test_a_worker_that_is_killed_in_a_chunk_changes_no_byte(place: Path, tmp_path: Path):
     job, folder = in_chunks(place / "walk.avi"), tmp_path / "whole"
-    os.environ.setdefault("PYTHONPATH", str(Path(__file__).parent))
     tasks = [(part, placed(part, chunks_of(folder)), tmp_path / "died") for part in job.parts]
     ends = list(work_at(tasks, killed_in_frame_20, on=Where(), workers=2))
     assert [one.failure for one in ends] == ["", ""]

@@ -24,6 +24,7 @@ from perdure.trackers.multifeature.weights import looks_for
 from perdure.types import Report
 
 OVERLAP = 4.0  # s: twice the time for which trackers look for who is not seen
+_OF_PARTS = ("format", "version", "perdure", "checkpoints", "resumed")  # what `run.json` has of a part alone
 _LEAST = 4  # frames of an overlap: one to see, one to say, on both sides
 
 
@@ -131,7 +132,7 @@ def stitch_parts(
     whole = write_whole(folder, list(zip(folders[:used], spans, strict=True)), made.scene, _kinds(made))
     totals = folder.write_results(reporting)
     ended, warnings = told[used - 1], _warnings(told[:used])
-    about = {key: value for key, value in told[0].items() if key not in ("format", "version", "perdure")}
+    about = {key: value for key, value in told[0].items() if key not in _OF_PARTS}
     about |= {"window": dict(window), "frames": whole.frames, "warnings": warnings, **dataclasses.asdict(totals)}
     about |= {"chunks": _about(spans, whole), "status": ended["status"], "message": ended.get("message", "")}
     folder.write_about(about)
