@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from dying import always_dies_at_one, killed_in_frame_20, refuses_odd_ones, squa
 from test_cli import write_film
 from worlds import crossing, two_apart
 
+from perdure.cli import resuming, running
 from perdure.cli.jobs import Job, placed, work_here
 from perdure.cluster import Ended, Where, work_at
 from perdure.errors import ParameterError
@@ -78,3 +80,24 @@ def test_all_results_are_there_and_the_same_when_a_worker_is_killed_in_the_middl
     assert (tmp_path / "died").exists()
     assert contents(tmp_path / on) == contents(tmp_path / "alone")
     assert len(contents(tmp_path / on)) == 8
+
+
+def test_a_run_of_a_job_holds_no_times_so_that_its_bytes_are_the_same_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A checkpoint that falls due at every frame would leave how long it took."""
+    monkeypatch.setattr(resuming, "SHARE", 1e9)
+    film = write_film(tmp_path / "apart.avi", [frame.image for frame in two_apart().frames()])
+    job = Job(str(film), {})
+    monkeypatch.setattr(running.Checkpoints, "__init__", hasty(running.Checkpoints.__init__))
+    work_here((job, placed(job, tmp_path / "runs")))
+    assert "checkpoints" not in json.loads((placed(job, tmp_path / "runs") / "run.json").read_text())
+
+
+def hasty(made: Callable[..., None]) -> Callable[..., None]:
+    """Checkpoints that wait for a millionth of the time that they are told to."""
+
+    def waiting(self: running.Checkpoints, folder: Path, every: float) -> None:
+        made(self, folder, every / 1e6)
+
+    return waiting

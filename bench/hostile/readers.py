@@ -433,6 +433,7 @@ READERS: Mapping[str, Reader] = {
                 "files.shapes.read_shape",
                 "files.shapes.read_ring",
                 "files.span.read_span",
+                "files.span.read_moment",
             ),
             (*_NUMBERS, ",", " ", "@", "=", ":", "f", "\u0664"),
         ),

@@ -50,6 +50,7 @@ NOT_FUZZED = {
     "files.networks.read_network": "onnxruntime and OpenVINO open it",
     "files.models.read_embedding": "onnxruntime opens it",
     "files.checkpoints.read_checkpoint": "it is states.load of a file",
+    "files.chunks.read_looks": "it is states.load of a file",
 }
 PARSED_ELSEWHERE = {
     "web/app.py": "requests to the viewer, which are no files",

@@ -7,6 +7,7 @@ import dataclasses
 import hashlib
 import io
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -154,12 +155,15 @@ def bring(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _done(job: Job, folder: RunFolder) -> dict[str, Any]:
-    """Run a job into a folder; whatever is printed meanwhile is nobody's to read."""
+    """Run a job into a folder; whatever is printed meanwhile is nobody's to read.
+
+    One whose worker dies is begun again from its first frame, so that there are no checkpoints.
+    """
     reporting = params.build(Reporting, job.reporting)
     with contextlib.redirect_stderr(io.StringIO()):
         made = plan(job.source, **job.settings)
         if job.within is None:
-            outcome = run(made, folder, reporting, window=window_of(job), film=job.film)
+            outcome = run(made, folder, reporting, window=window_of(job), film=job.film, every=math.inf)
         else:
             with contextlib.closing(open_source(job.source, fps=job.settings.get("fps"), **job.within)) as whole:
                 outcome = run_part(made, folder, reporting, window_of(job), whole)

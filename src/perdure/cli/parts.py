@@ -24,7 +24,7 @@ from perdure.trackers.multifeature.weights import looks_for
 from perdure.types import Report
 
 OVERLAP = 4.0  # s: twice the time for which trackers look for who is not seen
-_OF_PARTS = ("format", "version", "perdure", "checkpoints", "resumed")  # what `run.json` has of a part alone
+_OF_PARTS = ("format", "version", "perdure")  # what `run.json` has of a part alone
 _LEAST = 4  # frames of an overlap: one to see, one to say, on both sides
 
 
@@ -108,7 +108,13 @@ def run_part(
         corrections.append(Report(renamed=step.report.renamed, dropped=step.report.dropped))
 
     outcome = run(
-        dataclasses.replace(made, whole=whole), folder, reporting, window=window, film=False, beside=look
+        dataclasses.replace(made, whole=whole),
+        folder,
+        reporting,
+        window=window,
+        film=False,
+        every=math.inf,
+        beside=look,
     )
     write_looks(folder.path, portraits(album, Corrections.of(corrections).identity))
     return outcome
