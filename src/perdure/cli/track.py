@@ -114,18 +114,7 @@ def track(
     json_: options.JsonOption = False,
 ) -> None:
     """Track every moving thing in SOURCE into a run folder."""
-    if events not in (None, "-"):
-        raise ParameterError(f"--events {events}: only '-', for stdout, is known; the run folder has events.csv")
-    if events and json_:
-        raise ParameterError("--events - and --json both write to stdout; leave out one of them")
-    if resume and overwrite:
-        raise ParameterError("--resume goes on with a run and --overwrite replaces it; leave out one of them")
-    if roll is not None and (resume or overwrite):
-        raise ParameterError(
-            "--roll writes new folders beside those that are there; leave out --resume and --overwrite"
-        )
-    if keep and roll is None:
-        raise ParameterError("--keep goes with --roll; leave it out")
+    _agree(events=events, json_=json_, resume=resume, overwrite=overwrite, roll=roll, keep=keep)
     given = options.read_parameters(parameters, chosen)
     reporting = params.build(
         Reporting, {name: given.pop(name) for name in list(given) if name == "report_confidence"}
@@ -180,8 +169,9 @@ def track(
     except BaseException:
         made.source.close()
         raise
+    film = not no_video
     if earlier is not None and is_finished(earlier):
-        outcome = finished(made, earlier, film=not no_video)
+        outcome = finished(made, earlier, film=film)
     else:
         outcome = run(
             made,
@@ -189,7 +179,7 @@ def track(
             reporting,
             window=window,
             inputs=digests,
-            film=not no_video,
+            film=film,
             live=told,
             resume=earlier is not None,
             every=checkpoint_every,
@@ -198,3 +188,19 @@ def track(
         show(outcome, folder, as_json=json_)
     if outcome.code:
         raise typer.Exit(outcome.code)
+
+
+def _agree(*, events: str | None, json_: bool, resume: bool, overwrite: bool, roll: str | None, keep: int) -> None:
+    """Refuse options that contradict each other."""
+    if events not in (None, "-"):
+        raise ParameterError(f"--events {events}: only '-', for stdout, is known; the run folder has events.csv")
+    if events and json_:
+        raise ParameterError("--events - and --json both write to stdout; leave out one of them")
+    if resume and overwrite:
+        raise ParameterError("--resume goes on with a run and --overwrite replaces it; leave out one of them")
+    if roll is not None and (resume or overwrite):
+        raise ParameterError(
+            "--roll writes new folders beside those that are there; leave out --resume and --overwrite"
+        )
+    if keep and roll is None:
+        raise ParameterError("--keep goes with --roll; leave it out")
