@@ -351,3 +351,10 @@ def test_a_run_on_a_disk_that_is_full_goes_on_when_there_is_room(place: Path, sm
     assert perdure(*words, "--resume", at=place).returncode == 0
     perdure("track", "walk.avi", "--no-video", "--tracker", "compound", "-o", "wide", at=place)
     assert results(small_disk / "run") == results(place / "wide")
+
+
+def test_what_is_made_of_a_run_that_was_killed_says_that_it_is_not_whole(place: Path, once_killed: Path):
+    for words in (("export", once_killed, "-o", "part.txt"), ("convert", once_killed, "part.csv")):
+        done = perdure(*words, at=place)
+        assert done.returncode == 0
+        assert "has not ended: it is running still, or was killed" in done.stderr

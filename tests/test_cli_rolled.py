@@ -90,6 +90,7 @@ def test_what_was_tracked_before_a_stream_broke_off_is_kept_and_settled(
     ("words", "said"),
     [
         (["--roll", "1h"], "--roll is for what passes once"),
+        (["--roll", "banana"], "no length of time"),
         (["--roll", "1h", "--resume"], "leave out --resume"),
         (["--keep", "3"], "--keep goes with --roll"),
     ],

@@ -30,7 +30,7 @@ from perdure.files.formats.converting import write
 from perdure.files.formats.run import content_of
 from perdure.files.mot import write_rows
 from perdure.files.mots import write_masks
-from perdure.files.runs import Reporting, RunFolder
+from perdure.files.runs import Reporting, RunFolder, unended
 from perdure.files.whole import refuse_existing, whole_file
 from perdure.fold import Corrections, settle_with
 from perdure.types import Tracks
@@ -86,7 +86,8 @@ def export(
         raise ParameterError("--believed does not go with --format parquet, which holds both silhouettes")
     _refuse(output, run, format_, overwrite=overwrite)
     folder = RunFolder.open(run)
-    reporting = params.build(Reporting, {**folder.read_about().get("reporting", {}), **chosen})
+    about = folder.read_about()
+    reporting = params.build(Reporting, {**about.get("reporting", {}), **chosen})
     if format_ == "mask-png":
         written = _write_pictures(output, folder, reporting, believed=believed, overwrite=overwrite)
     elif format_ in WHOLE:
@@ -95,6 +96,8 @@ def export(
         written = _write_drawings(output, folder, reporting, believed=believed, overwrite=overwrite)
     else:
         written = _write_text(output, folder, reporting, format_, believed=believed)
+    if note := unended(folder, about, sum(one.frame >= 0 for one in folder.entries(with_masks=False))):
+        print(f"perdure: note: {note}", file=sys.stderr)
     if written.left_out:
         print(f"perdure: note: rows left out, without a silhouette: {written.left_out}", file=sys.stderr)
     if believed and not any(one is not None for _, rows in _counted(folder, reporting) for one in rows.believed):

@@ -44,13 +44,18 @@ class Chunks:
         ParameterError
             For what is no length of time.
         """
-        long, more = read_moment("chunks", length), read_moment("overlap", overlap)
+        long, more = read_moment("--chunks", length), read_moment("--overlap", overlap)
         assert long is not None
         if not (long.frame or long.seconds):
             raise ParameterError(
-                f"chunks = {length} leaves no frame; give a length such as '10:00', '90' or '3000f'"
+                f"--chunks = {length} leaves no frame; give a length such as '10:00', '90' or '3000f'"
             )
         return Chunks(long, more)
+
+    @property
+    def is_hasty(self) -> bool:
+        """Whether the overlap is shorter than trackers look for who is not seen, as far as the user says seconds."""
+        return self.overlap is not None and 0 < self.overlap.seconds < OVERLAP / 2
 
     def cut(self, source: Source, stride: int = 1) -> tuple[tuple[int, int], ...]:
         """Return the spans of frames of the parts of a source, each but the first with its overlap; () for only one.

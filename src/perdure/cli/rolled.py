@@ -42,13 +42,14 @@ def run_rolled(
         If the place cannot hold such folders.
     """
     try:
+        seconds = seconds_of(roll, "roll")
         if made.source.rereadable:
             raise ParameterError(
                 f"--roll is for what passes once, a camera or a URL; {made.source.name} ends, and its run is one folder, "
                 "read piece by piece however long it is. Leave out --roll, or take parts of it by --start and --end"
             )
         check_place(place)
-        rolling = Rolling(place, asked(made, reporting, window, inputs), reporting, seconds_of(roll, "roll"), keep)
+        rolling = Rolling(place, asked(made, reporting, window, inputs), reporting, seconds, keep)
     except BaseException:
         made.source.close()
         raise

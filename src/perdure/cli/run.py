@@ -7,6 +7,7 @@ import dataclasses
 import itertools
 import json
 import os
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Optional
@@ -281,7 +282,13 @@ def _cutting(chunks: str | None, overlap: str | None, settings: Mapping[str, Any
         raise ParameterError(
             "--init and --chunks: what is marked is known in one chunk alone; leave out one of the two"
         )
-    return Chunks.of(chunks, overlap)
+    cutting = Chunks.of(chunks, overlap)
+    if cutting.is_hasty:
+        print(
+            "perdure: note: with less than 2 s of --overlap, who is hidden at a border may come out as another",
+            file=sys.stderr,
+        )
+    return cutting
 
 
 def _cut(job: Job, cutting: Chunks | None) -> Job:

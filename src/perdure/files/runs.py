@@ -243,6 +243,21 @@ class RunFolder:
         return Totals(rows, len(ids), table.count)
 
 
+def unended(folder: RunFolder, about: Mapping[str, Any], frames: int) -> str:
+    """Return what is to be known of a run whose log, of so many frames, is not whole; empty where it is."""
+    status = str(about.get("status", "done"))
+    if status == "running":
+        return (
+            f"{folder.path} has not ended: it is running still, or was killed, and can be gone on with by --resume; "
+            f"it ends after {frames} frames"
+        )
+    if status != "done":
+        return f"{folder.path} is {status}: it ends after {frames} frames"
+    if isinstance(about.get("frames"), int) and frames < about["frames"]:
+        return f"the log of {folder.path} breaks off after {frames} of {about['frames']} frames"
+    return ""
+
+
 class _EventTable:
     """`events.csv`, gathered while the entries of a log pass by, and written in the order in which the events began."""
 

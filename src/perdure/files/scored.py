@@ -19,7 +19,7 @@ from perdure.files.images import natural_order
 from perdure.files.mot import protocol_of, read_said, read_truth
 from perdure.files.mot_table import read_table
 from perdure.files.mots import is_mots
-from perdure.files.runs import Reporting, RunFolder
+from perdure.files.runs import Reporting, RunFolder, unended
 from perdure.types import Event, Rows, Tracks
 
 _BOXES, _VISIBLE, _CLIP, _BLOBS = "gt/gt.txt", "gt/visible.txt", "clip.json", "gt/blobs.txt"
@@ -229,11 +229,7 @@ def _read_run(folder: RunFolder, masks: bool, report_confidence: float | None) -
         raise FormatError(f"{folder.path / 'run.json'}: {error}") from error
     tracks, events, frames = folder.read(with_masks=masks)
     counted = Rows.of_tracks(tracks.counted(least)).replace(size=_size(about))
-    notes = []
-    if about.get("status", "done") != "done":
-        notes.append(f"{folder.path} is {about['status']}: it ends after {frames} frames")
-    elif isinstance(about.get("frames"), int) and frames < about["frames"]:
-        notes.append(f"the log of {folder.path} breaks off after {frames} of {about['frames']} frames")
+    notes = [note for note in (unended(folder, about, frames),) if note]
     seen = counted if masks else None
     return Result(folder.path, counted, seen, tracks, events, least, tuple(notes), _part(about))
 

@@ -9,7 +9,7 @@ from perdure import params
 from perdure.errors import FormatError, ParameterError
 from perdure.files.formats.content import Content, Format, Reading
 from perdure.files.formats.traits import ALL
-from perdure.files.runs import Reporting, RunFolder
+from perdure.files.runs import Reporting, RunFolder, unended
 
 LOG = "tracks.jsonl"
 
@@ -36,12 +36,15 @@ def content_of(folder: RunFolder, about: dict[str, Any], report_confidence: floa
     width: Any = about.get("width")
     are_known = type(height) is int and type(width) is int and height > 0 and width > 0
     source = about.get("source")
+    frames = tuple(entry.frame for entry in folder.entries(with_masks=False) if entry.frame >= 0)
+    note = unended(folder, about, len(frames))
     return Content(
         folder.tracks().counted(report_confidence),
         size=(height, width) if are_known else None,
-        frames=tuple(entry.frame for entry in folder.entries(with_masks=False) if entry.frame >= 0),
+        frames=frames,
         timed=True,
         name=Path(source).stem if isinstance(source, str) else folder.path.resolve().name,
+        notes=(note,) if note else (),
     )
 
 
